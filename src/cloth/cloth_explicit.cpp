@@ -7,6 +7,19 @@
 
 namespace slender {
 
+namespace {
+
+/// Length of the longest of n vectors.
+double largest(int n, const PointVector& d)
+{
+  double square = 0.0;
+  for (int i = 0; i < n; ++i)
+    square = std::max(square, point(d, i).squaredNorm());
+  return std::sqrt(square);
+}
+
+}   // namespace
+
 /// The matrix of imex steps, with the bending of the system.
 void ClothStepper::Impl::useConstantMatrix()
 {
@@ -38,7 +51,7 @@ double ClothStepper::Impl::stableStep() const
   double square = 0.0;
   for (int k = 0; k < kIterations; ++k)
   {
-    const double scale = small / std::max(largest(mode), 1e-300);
+    const double scale = small / std::max(largest(n, mode), 1e-300);
     for (std::size_t i = 0; i < mode.size(); ++i)
     {
       mode[i] *= scale;

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include <Eigen/Eigenvalues>
+
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/geometry/mesh_defects.h"
 
@@ -78,9 +80,18 @@ double largestRestAngle(const ClothModel& model)
   return model.topology.hingeCount() > 0 ? restAngles(model).cwiseAbs().maxCoeff() : 0.0;
 }
 
-double restAngleLimit(const ClothModel& model)
+bool restsFlat(const ClothModel& model)
 {
-  return 1e-8 / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, model.rest.triangles.cols())));
+  constexpr double kFolded = 0.5;      // [rad]; rounding of vertices tilts no sound face so far
+  constexpr double kRounding = 2e-6;   // of the size
+  if (largestRestAngle(model) > kFolded)
+    return false;
+  const Eigen::Matrix3Xd& x = model.undeformed.cols() ? model.undeformed : model.rest.vertices;
+  const Eigen::Matrix3Xd from_mean = x.colwise() - x.rowwise().mean();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> spread(from_mean * from_mean.transpose());
+  const Eigen::Vector3d normal = spread.eigenvectors().col(0);   // of the plane that fits best
+  const double size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
+  return (normal.transpose() * from_mean).cwiseAbs().maxCoeff() <= kRounding * size;
 }
 
 void checkBending(const ClothModel& model)

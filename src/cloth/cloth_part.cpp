@@ -18,10 +18,10 @@ constexpr double kMostTurn = 0.7;       ///< of an edge in an iteration [rad], a
 }   // namespace
 
 ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options)
-  : stages_(std::make_unique<ClothStages>(std::move(model), options)),
-    budget_(std::make_shared<WorkBudget>())
+  : own_(std::make_unique<ClothStages>(std::move(model), options)),
+    stages_(*own_)
 {
-  const ClothModel& m = *stages_->model;
+  const ClothModel& m = *stages_.model;
   if (options.integrator != Integrator::implicit_euler)
     throw std::invalid_argument("cloth '" + m.name +
                                 "': contact and joints with other objects need time.integrator: implicit_euler");
@@ -29,7 +29,17 @@ ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions
     throw std::invalid_argument("cloth '" + m.name +
                                 "': a cloth that tracks a guide cannot touch, or be joined to, other objects than "
                                 "cloth and what moves as prescribed");
-  stages_->useBudget(budget_);
+  allocate();
+}
+
+ClothPart::ClothPart(ClothStages& stages) : stages_(stages), linearized_(stages.options.one_newton_step)
+{
+  allocate();
+}
+
+void ClothPart::allocate()
+{
+  const ClothModel& m = *stages_.model;
   inverse_length_.resize(static_cast<std::size_t>(m.topology.edges.cols()));
   for (std::size_t e = 0; e < inverse_length_.size(); ++e)
   {
@@ -37,38 +47,61 @@ ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions
     inverse_length_[e] = 1.0 / (m.rest.vertices.col(edge[1]) - m.rest.vertices.col(edge[0])).norm();
   }
   for (PointVector* v : {&base_, &saved_, &direction_, &solution_})
-    v->assign(stages_->x.size(), 0.0);
+    v->assign(stages_.x.size(), 0.0);
 }
 
 // ---- a step
 
 void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double duration)
 {
-  budget_->start(WorkBudget::kUnbounded);
-  stages_->begin(state, inputs, duration);
+  counts_ = {};
+  stages_.begin(state, inputs, duration);
   setPins(state.pins);
 }
 
 StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
-  stages_->beginStep(plan, substep.from, substep.to);
+  stages_.beginStep(plan, substep.from, substep.to);
   return StepFailure::none;
 }
 
 void ClothPart::beginStage(std::size_t stage)
 {
-  stages_->beginStage(stage);
-  stages_->placeGuess();
+  stages_.beginStage(stage);
+  if (linearized_)
+    stages_.placeLinearized(direction_);
+  else
+    stages_.placeGuess();
   base_ = system().start();
   near_ = indefinite_ = false;
 }
 
 void ClothPart::endStage(std::size_t stage, bool last, StepReport& report)
 {
-  if (last)
-    stages_->takeEnd(std::max(stages_->largestInternal(), largest_contact_), evaluation.max_strain, report);
-  else
-    stages_->endStage(stage);
+  if (!last)
+  {
+    stages_.endStage(stage);
+    return;
+  }
+  stages_.takeEnd(std::max(largest_internal_, largest_contact_), evaluation.max_strain, report);
+  report.linear_iterations += counts_.linear_iterations;
+  counts_ = {};
+}
+
+StepFailure ClothPart::finishSubstep(StepReport&)
+{
+  return linearized_ && stages_.createsEnergy(evaluation.stretch + evaluation.bend_twist) ? StepFailure::energy_grew
+                                                                                          : StepFailure::none;
+}
+
+/// The semidefinite Hessian is positive definite with inertia, so that no shift mends what its solver cannot solve.
+StepFailure ClothPart::givesUp() const
+{
+  if (stages_.workExceeded())
+    return StepFailure::work_exceeded;
+  if (exact_ || coupled || outcome_ == LinearOutcome::solved)
+    return StepFailure::none;
+  return outcome_ == LinearOutcome::not_converged ? StepFailure::linear_unconverged : StepFailure::singular_matrix;
 }
 
 Largest ClothPart::unbalancedForce() const
@@ -99,7 +132,7 @@ bool ClothPart::numberUnknowns()
 
 void ClothPart::moveAlong(double alpha)
 {
-  PointVector& x = stages_->x;
+  PointVector& x = stages_.x;
   if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
   {
     std::copy(base_.begin(), base_.end(), x.begin());
@@ -107,54 +140,55 @@ void ClothPart::moveAlong(double alpha)
   }
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] = base_[i] + alpha * direction_[i];
+  stages_.meetAverages();
 }
 
 void ClothPart::retreat(double share)
 {
   for (int i = 0; i < points(); ++i)
     if (isFree(i))
-      vertex(stages_->x, i) = vertex(base_, i) + share * (vertex(stages_->x, i) - vertex(base_, i));
+      vertex(stages_.x, i) = vertex(base_, i) + share * (vertex(stages_.x, i) - vertex(base_, i));
 }
 
 void ClothPart::placeHeld(double fraction)
 {
-  const std::vector<int>& pins = stages_->present().pins;
+  const std::vector<int>& pins = stages_.present().pins;
   for (std::size_t k = 0; k < pins.size(); ++k)
-    vertex(stages_->x, pins[k]) = stages_->pinAt(k, fraction);
+    vertex(stages_.x, pins[k]) = stages_.pinAt(k, fraction);
 }
 
 bool ClothPart::heldMoves(double from, double to) const
 {
-  const std::vector<int>& pins = stages_->present().pins;
+  const std::vector<int>& pins = stages_.present().pins;
   for (std::size_t k = 0; k < pins.size(); ++k)
-    if (from == to ? vertex(stages_->x, pins[k]) != vertex(base_, pins[k])
-                   : stages_->pinAt(k, from) != stages_->pinAt(k, to))
+    if (from == to ? vertex(stages_.x, pins[k]) != vertex(base_, pins[k])
+                   : stages_.pinAt(k, from) != stages_.pinAt(k, to))
       return true;
   return false;
 }
 
 void ClothPart::retreatHeld(double share)
 {
-  for (const int p : stages_->present().pins)
-    vertex(stages_->x, p) = vertex(base_, p) + share * (vertex(stages_->x, p) - vertex(base_, p));
+  for (const int p : stages_.present().pins)
+    vertex(stages_.x, p) = vertex(base_, p) + share * (vertex(stages_.x, p) - vertex(base_, p));
 }
 
 void ClothPart::gather(Eigen::Matrix3Xd& x) const
 {
   for (int i = 0; i < points(); ++i)
-    x.col(first_point + i) = vertex(stages_->x, i);
+    x.col(first_point + i) = vertex(stages_.x, i);
 }
 
-void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_point, points()) = stages_->present().x; }
+void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_point, points()) = stages_.present().x; }
 
 // ---- equations
 
 void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  exact_ = near_ && shift.position == 0.0;
+  exact_ = near_ && shift.position == 0.0 && !linearized_;
   const ClothEvaluation e =
-      with_hessian ? system().evaluateHessian(stages_->x, exact_ ? HessianKind::exact : HessianKind::semidefinite)
-                   : system().evaluate(stages_->x);
+      with_hessian ? system().evaluateHessian(stages_.x, exact_ ? HessianKind::exact : HessianKind::semidefinite)
+                   : system().evaluate(stages_.x);
   largest_contact_ = 0.0;
   evaluation = {};
   evaluation.stretch = e.membrane;
@@ -163,6 +197,8 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   evaluation.max_strain = e.max_strain;
   if (coupled)
     return;
+  if (!with_hessian)
+    largest_internal_ = stages_.closeGradient();
   addOwnContacts(with_hessian);
   if (with_hessian && std::isfinite(evaluation.energy()))
     factor(shift);
@@ -209,22 +245,27 @@ void ClothPart::addOwnContacts(bool with_hessian)
       addToBlocks(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
 }
 
-/// Conjugate gradients find out only while they solve whether a matrix is definite, so that they solve here.
+/// Conjugate gradients find out only while they solve whether a matrix is definite, so that they solve here. A
+/// linearised step moves what is held, which factors alone do not.
 void ClothPart::factor(const HessianShift& shift)
 {
   const double added = inertiaShift(shift);
   if (added > 0.0)
     system().shiftMatrix(added);
-  ClothLinearSolver& linear = *stages_->linear;
-  bool definite = false;
-  if (linear.kind() == ClothSolver::cholesky)
-    definite = linear.factor();
+  if (solvesByFactors())
+    outcome_ = stages_.linear->factor() ? LinearOutcome::solved : LinearOutcome::not_definite;
   else
   {
-    int iterations = 0, factorizations = 0;
-    std::fill(solution_.begin(), solution_.end(), 0.0);
-    definite = linear.solve(solution_, &stages_->x, iterations, factorizations) == LinearOutcome::solved;
+    if (linearized_)
+    {
+      stages_.takeStartEnergy(evaluation.stretch + evaluation.bend_twist);
+      std::copy(direction_.begin(), direction_.end(), solution_.begin());
+    }
+    else
+      std::fill(solution_.begin(), solution_.end(), 0.0);
+    outcome_ = stages_.solveNewton(solution_, linearized_, counts_);
   }
+  const bool definite = outcome_ == LinearOutcome::solved;
   if (exact_ && added == 0.0)
     indefinite_ = !definite;
   evaluation.inertia.negative = !definite && !stepsInterrupted();   // minimize() ends when it is interrupted
@@ -232,11 +273,11 @@ void ClothPart::factor(const HessianShift& shift)
 
 void ClothPart::solve()
 {
-  if (stages_->linear->kind() == ClothSolver::cholesky)
+  if (solvesByFactors())
   {
     for (int i = 0; i < points(); ++i)
       vertex(direction_, i) = isFree(i) ? Eigen::Vector3d(-vertex(system().gradient(), i)) : Eigen::Vector3d::Zero();
-    stages_->linear->solveFactored(direction_);
+    stages_.linear->solveFactored(direction_);
   }
   else
     std::swap(direction_, solution_);
@@ -336,7 +377,9 @@ void ClothPart::addColumns(int point, int component, double weight, Columns& row
 
 double ClothPart::stepLimit() const
 {
-  const auto& edges = stages_->model->topology.edges;
+  if (!contact_)   // the energy alone bears turns of any size
+    return 1.0;
+  const auto& edges = stages_.model->topology.edges;
   double turn = 0.0;
   for (std::size_t e = 0; e < inverse_length_.size(); ++e)
   {
@@ -351,7 +394,7 @@ double ClothPart::incrementSize(double) const
   double square = 0.0;
   for (int i = 0; i < points(); ++i)
     square = std::max(square, vertex(direction_, i).squaredNorm());
-  return std::sqrt(square) / stages_->shortestEdge();
+  return std::sqrt(square) / stages_.shortestEdge();
 }
 
 double ClothPart::slope() const
@@ -375,10 +418,10 @@ double ClothPart::residual() const
 /// what Newton's tolerance leaves.
 double ClothPart::forceScale() const
 {
-  const ClothModel& m = *stages_->model;
-  double largest = std::max(stages_->resolvedForce(), stages_->largestInternal());
-  largest = std::max(largest, m.mass.maxCoeff() * stages_->inputs().gravity.norm());
-  for (const int p : stages_->present().pins)
+  const ClothModel& m = *stages_.model;
+  double largest = std::max(stages_.resolvedForce(), stages_.largestInternal());
+  largest = std::max(largest, m.mass.maxCoeff() * stages_.inputs().gravity.norm());
+  for (const int p : stages_.present().pins)
     largest = std::max(largest, vertex(system().gradient(), p).norm());
   return largest;
 }
@@ -387,9 +430,9 @@ double ClothPart::forceScale() const
 /// inertia in short steps.
 double ClothPart::noiseLevel() const
 {
-  const ClothModel& m = *stages_->model;
+  const ClothModel& m = *stages_.model;
   double extent = 0.0;
-  for (const double x : stages_->x)
+  for (const double x : stages_.x)
     extent = std::max(extent, std::abs(x));
   const std::vector<double>& weights = system().weights();
   const double stiffness = m.membrane.c11 + m.membrane.c22 + *std::max_element(weights.begin(), weights.end());

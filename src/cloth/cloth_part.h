@@ -23,13 +23,16 @@ public:
   /// Throws std::invalid_argument for other integrators than implicit_euler, for prescribed averages, and for a model
   /// or options that are not valid. The island minimises wholly, whether the options ask for one Newton step or not.
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
+  /// A cloth alone in its island, with all integrators and with averages. `one_newton_step` of the options holds. The
+  /// stages must outlive the part; others begin and end their steps, and start their budget.
+  explicit ClothPart(ClothStages& stages);
 
   /// State, inputs, forces on pins, and messages.
-  ClothStages& stages() const { return *stages_; }
+  ClothStages& stages() const { return stages_; }
   /// Whether a step from this state with these inputs can begin. If not, the report says why.
   bool accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const
   {
-    return stages_->accepts(state, inputs, duration, report);
+    return stages_.accepts(state, inputs, duration, report);
   }
 
   /// Sets what the cloth touches, and which solids its points pass through. `step` is the length of a step [s]. Without
@@ -37,26 +40,30 @@ public:
   void setContact(const ContactProperties& contact, double step, const std::vector<IgnoredSolid>& ignored = {});
   /// These vertices are driven corners of the surface from now on. begin() takes them from the state.
   void setPins(const std::vector<int>& pins);
-  int points() const override { return stages_->model->vertices(); }
+  int points() const override { return stages_.model->vertices(); }
   void addSurface(ContactSurface& surface) const override;
 
   // ---- a step
   /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
   void begin(const ClothState& state, const ClothInputs& inputs, double duration);
-  void end(ClothState& state) { stages_->end(state); }
+  void end(ClothState& state) { stages_.end(state); }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport& report) override;
-  void acceptSubstep(const Substep&) override { stages_->commitStep(); }
+  StepFailure finishSubstep(StepReport&) override;
+  void acceptSubstep(const Substep&) override { stages_.commitStep(); }
   Largest unbalancedForce() const override;
   void refuse(StepFailure failure, double length, StepReport& report) const override
   {
-    stages_->refuseUnsolved(report, failure, length);
+    stages_.refuseUnsolved(report, failure, length);
   }
+
+  bool shorterMayHelp(StepFailure) const override { return !stages_.workExceeded(); }
+  StepFailure givesUp() const override;
 
 private:
   // ---- its steps
-  double shortestEdge() const override { return stages_->shortestEdge(); }
+  double shortestEdge() const override { return stages_.shortestEdge(); }
   long surfaceVersion() const override { return surface_version_; }
   BarrierRange barrierRange(double gap) const override;
   BoundingBox surfaceBox(double ahead) const override;
@@ -65,7 +72,7 @@ private:
   bool numberUnknowns() override;
   int unknowns() const override { return unknowns_; }
   void moveAlong(double alpha) override;
-  void accept() override { base_ = stages_->x; }
+  void accept() override { base_ = stages_.x; }
   void saveBase() override { saved_ = base_; }
   void restoreBase() override { base_ = saved_; }
   void retreat(double share) override;
@@ -96,24 +103,30 @@ private:
 
   static Eigen::Map<Eigen::Vector3d> vertex(PointVector& v, int i) { return point(v, i); }
   static Eigen::Map<const Eigen::Vector3d> vertex(const PointVector& v, int i) { return point(v, i); }
-  ClothSystem& system() const { return *stages_->system; }
+  ClothSystem& system() const { return *stages_.system; }
   bool isFree(int i) const { return number_[i] >= 0; }
   double inertiaShift(const HessianShift& shift) const;
   void addToBlocks(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
   void addOwnContacts(bool with_hessian);
   void factor(const HessianShift& shift);
+  void allocate();
+  bool solvesByFactors() const { return stages_.linear->kind() == ClothSolver::cholesky && !linearized_; }
 
-  std::unique_ptr<ClothStages> stages_;   ///< whose x is the trial
+  std::unique_ptr<ClothStages> own_;   ///< null: those of others
+  ClothStages& stages_;                ///< whose x is the trial
+  bool linearized_ = false;            ///< steps are one step of Newton's method
   std::optional<ContactProperties> contact_;
   std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
   double contact_step_ = 0.0;                                  ///< [s]
   std::shared_ptr<const Eigen::Matrix3Xd> rest_;
   std::vector<int> surface_pins_;   ///< that the surface has as driven corners
   long surface_version_ = 0;
-  std::shared_ptr<WorkBudget> budget_;   ///< The island bounds the work, so that this one has no bound.
   std::vector<double> inverse_length_;   ///< of edges at rest [1/m]
   PointVector base_, saved_, direction_, solution_;
-  double largest_contact_ = 0.0;   ///< force on a vertex in the last evaluation [N]
+  LinearOutcome outcome_ = LinearOutcome::solved;   ///< of the last solution with the own matrix
+  StepReport counts_;                               ///< of linear equations that no report has yet
+  double largest_contact_ = 0.0;                    ///< force on a vertex in the last evaluation [N]
+  double largest_internal_ = 0.0;                   ///< in the last evaluation without Hessian, likewise
   int unknowns_ = 0;
   std::vector<int> number_;   ///< per vertex: of the first of its unknowns in the part, or kPrescribed
   std::vector<char> held_;    ///< for which the vertices were numbered

@@ -181,6 +181,13 @@ void ClothStages::placeGuess()
   for (int i = 0; i < model->vertices(); ++i)
     point(x, i) = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i))
                                     : Eigen::Vector3d(point(guess_, i));
+  meetAverages();
+}
+
+void ClothStages::meetAverages()
+{
+  if (averages)
+    averages->meetAverages(averages_, x);
 }
 
 void ClothStages::endStage(std::size_t s)

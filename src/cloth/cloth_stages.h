@@ -16,8 +16,7 @@ struct ClothBalance
   double force = 0;        ///< of all kinds
 };
 
-/// A step of one cloth in implicit stages, whose equations something else solves: ClothStepper for a cloth on its own,
-/// ClothPart in an island.
+/// A step of one cloth in implicit stages, whose equations an island solves, see ClothPart.
 ///
 /// A step is begin(), substeps, end(). A substep is beginStep(); for each stage beginStage(), the solution of its
 /// equations in `x`, and endStage(), after the last one takeEnd() instead; then commitStep(), or the next attempt.
@@ -46,12 +45,28 @@ public:
   void beginStep(const StepPlan& plan, double from, double to);
   /// Sets inertia, loads, viscous response and what is held.
   void beginStage(std::size_t stage);
-  /// x := the motion carried on; what is held stands where it is at the end of the stage.
+  /// x := the motion carried on; what is held stands where it is at the end of the stage. Averages are met.
   void placeGuess();
+  /// Prepares one step of Newton's method. x := where the step is linearised; held vertices are not moved yet.
+  /// motion := from there to the end of the stage as placeGuess() has it.
+  void placeLinearized(PointVector& motion);
+  /// Solves the Newton equations of the last evaluation with a Hessian. `d` holds a first guess, and what held vertices
+  /// move by. `linearized`: for a step that placeLinearized() began, which ends at the prescribed averages.
+  LinearOutcome solveNewton(PointVector& d, bool linearized, StepReport& counts);
+  /// Moves the free vertices of x so that the prescribed averages of the substep are met to rounding.
+  void meetAverages();
+  /// Of an evaluation at the start of a linearised stage: elastic and viscous energy there [J].
+  void takeStartEnergy(double energy);
+  /// Completes an evaluation at x without contact: counts the work of pins and averages, and takes the part out of the
+  /// gradient that the averages balance. Returns the largest elastic and viscous force on a vertex [N].
+  double closeGradient();
   /// Takes x as the end of a stage that is not the last.
   void endStage(std::size_t stage);
+  /// After takeEnd() of a linearised substep. Returns whether its end has more energy than the start and the work of
+  /// loads, pins and averages can give. `energy`: elastic and viscous energy at the end [J].
+  bool createsEnergy(double energy) const;
   /// Takes x as the end of the substep. The gradient of the system must be that at x, with all that acts there.
-  /// `internal`: largestInternal() there, before contact added to the gradient.
+  /// `internal`: the largest force that closeGradient() returned, or of contact [N].
   ClothBalance takeEnd(double internal, double max_strain, StepReport& report);
   void commitStep() { std::swap(work_, next_); }
 
@@ -61,6 +76,7 @@ public:
   const ClothState& present() const { return work_; }
   /// Inputs of the step.
   const ClothInputs& inputs() const { return *inputs_; }
+  bool workExceeded() const { return budget_->spent(); }
   /// Where pin k of the state is at a fraction of the step.
   Eigen::Vector3d pinAt(std::size_t k, double fraction) const;
   double shortestEdge() const { return shortest_edge_; }   ///< at rest [m]
@@ -77,6 +93,7 @@ public:
   AveragedClothSolver* averages = nullptr;   ///< the same, where averages are prescribed; else null
   PointVector x;                             ///< present configuration: a guess, or the solution of a stage
   Eigen::Matrix3Xd pin_forces;               ///< of the cloth on its pins at the end of the substep [N]
+  Eigen::Matrix3Xd average_forces;           ///< of prescribed averages at the end of the substep [N]
 
 protected:
   /// Is called when the system is of another model, see followClamps().
@@ -111,11 +128,14 @@ protected:
   /// stage count that of the end in the same way; steps of two, whose stages have viscous forces of their own, without
   /// these.
   double energy_start_ = 0, elastic_start_ = 0;
+  /// Of averages and of pins from the start of a step to its end [J].
+  double average_work_ = 0, pin_work_ = 0;
 
 private:
   void buildSystem(const ClothModel& of);
   bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
   void combine(const Combination& c, PointVector& result) const;
+  double workOnFree(const PointVector& forces) const;
 
   std::vector<int> clamp_pins_;   ///< of the state whose clamped faces act; with clamped faces only
   bool clamps_known_ = false;

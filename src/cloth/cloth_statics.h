@@ -67,6 +67,7 @@ public:
   double noiseLevel() const;
   double forceScale() const;
   static constexpr bool anglesMayKeepShift() { return false; }
+  static constexpr StepFailure givesUp() { return StepFailure::none; }
   /// without forces there is no scale
   static constexpr double mostUnbalanced() { return std::numeric_limits<double>::infinity(); }
 

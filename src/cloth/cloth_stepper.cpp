@@ -7,9 +7,29 @@ namespace slender {
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o) : ClothStages(std::move(m), o)
 {
-  own_plan_.stages.reserve(2);
-  best_.assign(x.size(), 0.0);
   useConstantMatrix();
+  if (!isExplicit())
+    part_ = std::make_unique<ClothPart>(*this);
+}
+
+/// The island of the cloth alone that steps as the options say now.
+Island& ClothStepper::Impl::island()
+{
+  constexpr double kUnbalanced = 0.1;   // of the largest force: not a solution
+  std::unique_ptr<Island>& island = undivided ? undivided_ : island_;
+  if (!island)
+  {
+    TimeConfig time;
+    time.integrator = options.integrator;
+    time.error_tolerance = options.error_tolerance;
+    time.min_step = options.min_step;
+    time.newton = options.newton;
+    time.newton.one_step = options.one_newton_step;
+    island = std::make_unique<Island>(time, false);
+    island->equations().tolerances.most_unbalanced = kUnbalanced;
+    island->setParts({part_.get()});
+  }
+  return *island;
 }
 
 StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs, double duration)
@@ -19,15 +39,26 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
     budget_->start(options.error_tolerance > 0 ? WorkBudget::kUnbounded : WorkBudget::ofStep(model->vertices()));
   if (!accepts(state, inputs, duration, report))
     return report;
-  begin(state, inputs, duration);
-  const bool adaptive = options.error_tolerance > 0;
-  SubstepController controller({duration, adaptive ? state.next_step : 0.0, options.error_tolerance, options.min_step,
-                                order(options.integrator), options.newton.max_cuts});
-  controller.run(*this, duration, report);
+  double next = state.next_step;
+  if (isExplicit())
+  {
+    begin(state, inputs, duration);
+    SubstepRule rule;
+    rule.longest = duration;
+    rule.max_cuts = options.newton.max_cuts;
+    SubstepController controller(rule);
+    controller.run(*this, duration, report);
+    next = controller.nextLength();
+  }
+  else
+  {
+    part_->begin(state, inputs, duration);
+    report = island().step(duration, next);
+  }
   if (!report.ok)
     return report;
   report.work = ownWork();
-  work_.next_step = controller.nextLength();
+  work_.next_step = next;
   end(state);
   return report;
 }
@@ -36,12 +67,11 @@ StepFailure ClothStepper::Impl::attempt(const Substep& substep, StepReport& repo
 {
   if (budget_->spent())
     return StepFailure::work_exceeded;
-  if (options.integrator == Integrator::imex)
-    return imexStep(substep.from, substep.to, report);
-  return isExplicit() ? explicitStep(substep.from, substep.to, report) : implicitStep(substep.from, substep.to, report);
+  return options.integrator == Integrator::imex ? imexStep(substep.from, substep.to, report)
+                                                : explicitStep(substep.from, substep.to, report);
 }
 
-bool ClothStepper::Impl::shorterMayHelp(StepFailure) const { return !isExplicit() && !budget_->spent(); }
+bool ClothStepper::Impl::shorterMayHelp(StepFailure) const { return false; }
 
 void ClothStepper::Impl::refuse(const Substep& substep, StepFailure failure, StepReport& report)
 {
@@ -85,7 +115,9 @@ StepReport ClothStepper::stepUndivided(ClothState& state, const ClothInputs& inp
   impl_->options.error_tolerance = 0.0;
   if (own.integrator == Integrator::tr_bdf2)
     impl_->options.integrator = Integrator::implicit_euler;
+  impl_->undivided = own.error_tolerance > 0.0 || own.integrator == Integrator::tr_bdf2;
   const StepReport report = impl_->step(state, inputs, duration);
+  impl_->undivided = false;
   if (report.ok)
     state.next_step = next_step;
   impl_->options = own;

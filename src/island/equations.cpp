@@ -263,6 +263,14 @@ double Equations::forceScale() const
   return largest;
 }
 
+StepFailure Equations::givesUp() const
+{
+  for (const Part* part : parts_)
+    if (const StepFailure why = part->givesUp(); why != StepFailure::none)
+      return why;
+  return StepFailure::none;
+}
+
 double Equations::noiseLevel() const
 {
   double largest = 0.0;

@@ -111,6 +111,7 @@ private:
   double incrementSize() const;
   bool anglesMayKeepShift() const { return tolerances.angles_may_keep_shift; }
   double mostUnbalanced() const { return tolerances.most_unbalanced; }
+  StepFailure givesUp() const;
   double slope() const;
   double residual() const;
   double noiseLevel() const;

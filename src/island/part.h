@@ -185,6 +185,8 @@ public:
   virtual double energyAtEnd() const { return 0.0; }
 
   // ---- failures
+  /// Why Newton's method cannot go on after the last evaluation, whatever is added to the Hessian. `none`: it can.
+  virtual StepFailure givesUp() const { return StepFailure::none; }
   /// Whether a shorter substep may succeed where the last one failed.
   virtual bool shorterMayHelp(StepFailure) const { return true; }
   /// Changes the present state so that longer substeps may succeed, if the part can.

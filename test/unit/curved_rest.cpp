@@ -82,6 +82,35 @@ TEST(CurvedRest, SteppersRefuseConstantMatricesOfCurvedShapes)
   }
 }
 
+/// The sheet is 0.5 m long, so that the limit is 1e-6 m.
+TEST(CurvedRest, RoundingOfFilesBendsNothing)
+{
+  const auto rounded = [](double unit) {
+    TriangleMesh mesh = tiltedSheet();
+    mesh.vertices = unit * (mesh.vertices / unit).array().round().matrix();
+    return restsFlat(*shellOf(mesh, BendingModel::isometric_nonconforming));
+  };
+  EXPECT_TRUE(rounded(1e-9));
+  EXPECT_TRUE(rounded(1e-6));
+  EXPECT_FALSE(rounded(1e-5));
+}
+
+TEST(CurvedRest, FoldsAndSmallBumpsAreCurved)
+{
+  TriangleMesh bump = gridMesh(0.4, 0.3, 12, 0, GridPattern::equilateral);
+  bump.vertices(2, 60) += 2e-6;
+  EXPECT_FALSE(restsFlat(*shellOf(bump, BendingModel::isometric_nonconforming)));
+  TriangleMesh folded;   // two triangles that lie on each other
+  folded.vertices.resize(3, 4);
+  folded.vertices << 0, 1, 0, 0.9, 0, 0, 1, 0.9, 0, 0, 0, 0;
+  folded.triangles.resize(3, 2);
+  folded.triangles << 0, 2, 1, 1, 2, 3;
+  const auto model = shellOf(folded, BendingModel::isometric_nonconforming);
+  EXPECT_TRUE(restsFlat(*model));
+  folded.vertices.col(3) = Vector3d(0.1, 0.1, 0.0);
+  EXPECT_FALSE(restsFlat(*shellOf(folded, BendingModel::isometric_nonconforming)));
+}
+
 TEST(CurvedRest, RatiosOfBendingBelongToIsometricBendingOfFlatShapes)
 {
   for (const BendingModel bending : {BendingModel::none, BendingModel::hinge, BendingModel::isometric_conforming})

@@ -110,14 +110,10 @@ ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& verti
 /// Largest angle [rad] between two adjacent faces of the undeformed shape, or of the rest shape where that is empty.
 double largestRestAngle(const ClothModel& model);
 
-/// The largest such angle [rad] of a rest shape that counts as flat: 1e-8 over the square root of the number of faces.
-/// A sheet bent by that much everywhere in one direction leaves its plane by about 1e-9 of its size. Files with six
-/// digits are beyond it unless the sheet is parallel to a plane of coordinates.
-double restAngleLimit(const ClothModel& model);
-
 /// Whether isometric bending keeps the rest shape: its constant matrix acts on positions and flattens all that is
-/// curved.
-inline bool restsFlat(const ClothModel& model) { return largestRestAngle(model) <= restAngleLimit(model); }
+/// curved. A shape counts as flat if no vertex is farther from a plane than two millionths of the shape's size, which is
+/// the precision of files with six digits, and if it is not folded onto itself.
+bool restsFlat(const ClothModel& model);
 
 /// Throws std::invalid_argument with the fix where the bending model does not suit the cloth: isometric bending of a
 /// curved rest shape, a Poisson's ratio of bending that the model does not have or that is out of range, an undeformed

@@ -47,6 +47,7 @@ public:
   double incrementSize() const;
   /// No: where nodes are held only frames move, and then no increment of positions tells whether they have arrived.
   static constexpr bool anglesMayKeepShift() { return false; }
+  static constexpr StepFailure givesUp() { return StepFailure::none; }
   double slope() const;        ///< gradient . direction [J]
   double residual() const;     ///< largest unbalanced nodal force or moment / edge [N]
   double forceScale() const;   ///< largest internal or external force [N]

@@ -33,6 +33,7 @@ constexpr double kFoldedChi = 1.5e-3;
 /// are accepted by a watchdog [Nocedal & Wright, Numerical Optimization, 15.6]: nearly inextensible bodies gain a
 /// little stretching energy in every full step that turns them, and a strict line search would creep. Full steps may
 /// raise the energy a few times; if it does not then fall below its best, the search returns there and becomes strict.
+/// With `one_step` it takes one full step and leaves forces unbalanced.
 template <class System>
 NewtonResult minimize(System& system, const NewtonConfig& config)
 {
@@ -60,10 +61,14 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
   {
     if (stepsInterrupted())
       return fail(StepFailure::interrupted);
+    if (const StepFailure why = system.givesUp(); why != StepFailure::none)
+      return fail(why);
     // round-off of the energy's sum; differences below it mean nothing
     const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
     while (!trial.inertia.positiveDefinite())
     {
+      if (const StepFailure why = system.givesUp(); why != StepFailure::none)
+        return fail(why);
       shift.raise();
       if (shift.position > kMaxShift)
         return fail(StepFailure::singular_matrix);
@@ -74,6 +79,14 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     result.definite = shift.none();
     system.solve();
     ++result.iterations;
+
+    if (config.one_step)
+    {
+      system.moveAlong(1.0);
+      trial = system.evaluate(false);
+      result.max_strain = trial.max_strain;
+      return std::isfinite(trial.energy()) ? result : fail(StepFailure::state_not_finite);
+    }
 
     const double increment = system.incrementSize(), slope = system.slope();
     if (!std::isfinite(increment))
@@ -95,7 +108,8 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       system.moveAlong(1.0);
       trial = system.evaluate(false);
       const double residual = system.residual();
-      result.residual = residual / system.forceScale();
+      const double scale = system.forceScale();
+      result.residual = scale > 0.0 ? residual / scale : 0.0;   // without forces nothing is out of balance
       result.max_strain = trial.max_strain;
       const bool balanced = result.residual <= system.mostUnbalanced() || residual <= system.noiseLevel();
       if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi && balanced)

@@ -16,7 +16,7 @@ TimeConfig readTime(const YamlCursor& at)
   assign(time.integrator,
          map.get("integrator",
                  "Method by which time steps are taken. Without the key: tr_bdf2; implicit_euler in scenes with cloth, "
-                 "with rods that have `contact`, and with rods that have `track`. Threads always take implicit_euler; "
+                 "with contact of rods or bodies, and with rods that have `track`. Threads always take implicit_euler; "
                  "imex is for cloth alone, and symplectic_euler takes explicit steps.")
              .choice<Integrator>({{"implicit_euler", Integrator::implicit_euler},
                                   {"bdf2", Integrator::bdf2},

@@ -344,15 +344,35 @@ void checkTrackedTime(YamlMap& map, SceneConfig& scene)
     map.find("start").problem("is not for rods that track a guide; must be as_given");
 }
 
-/// The integrator of rods that touch something.
+bool touchesSomething(const RodConfig& rod) { return rod.contact.has_value(); }
+
+/// Whether a simulated body has a shape that may hit something.
+bool hitsSomething(const SceneConfig& scene, const BodyConfig& body)
+{
+  return !body.motion && body.shape && body.contact &&
+         (!scene.obstacles.empty() || std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodyConfig& other) {
+           return &other != &body && other.shape && other.contact;
+         }));
+}
+
+/// The integrator of rods and bodies that touch something, or that a thread may touch.
 void checkContactTime(const YamlCursor& time, SceneConfig& scene)
 {
-  const bool touches =
-      std::any_of(scene.rods.begin(), scene.rods.end(), [](const RodConfig& rod) { return rod.contact.has_value(); });
+  const auto hits = [&](const BodyConfig& body) { return hitsSomething(scene, body); };
+  const bool flows =
+      !(scene.rods.empty() && scene.bodies.empty()) &&
+      std::any_of(scene.threads.begin(), scene.threads.end(), [](const ThreadConfig& t) { return t.contact.has_value(); });
+  const bool touches = flows || std::any_of(scene.rods.begin(), scene.rods.end(), touchesSomething) ||
+                       std::any_of(scene.bodies.begin(), scene.bodies.end(), hits);
   if (touches && !YamlMap(time).has("integrator"))
   {
     // methods of second order carry an impact's velocity on and bounce
     scene.time.integrator = Integrator::implicit_euler;
+    const bool changed = !std::all_of(scene.rods.begin(), scene.rods.end(), touchesSomething);
+    if (changed)
+      scene.notes.push_back(
+          "contact makes implicit_euler the default integrator of the whole scene, also of rods without contact; give "
+          "time.integrator to choose");
   }
   else if (touches && scene.time.integrator != Integrator::implicit_euler &&
            scene.time.integrator != Integrator::symplectic_euler)
@@ -360,16 +380,16 @@ void checkContactTime(const YamlCursor& time, SceneConfig& scene)
     YamlMap(time)
         .find("integrator")
         .warning(
-            "of second order carries the velocity before an impact beyond it, so that a rod may bounce higher than it "
-            "fell: use implicit_euler, the default with contact, where rods hit something");
+            "of second order carries the velocity before an impact beyond it, so that a rod or body may bounce higher "
+            "than it fell: use implicit_euler, the default with contact, where something is hit");
   }
   if (touches && scene.time.integrator == Integrator::symplectic_euler)
   {
     YamlMap(time)
         .find("integrator")
         .problem(
-            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, "
-            "bdf2 or tr_bdf2, or no rod may have contact");
+            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, bdf2 or tr_bdf2, "
+            "or nothing may have contact (bodies: contact: false)");
   }
 }
 
