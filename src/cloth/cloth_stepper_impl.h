@@ -40,7 +40,7 @@ private:
   StepFailure imexStep(double from, double to, StepReport& report);
 
   std::unique_ptr<ClothStatics> statics_;   ///< from the first equilibrium on
-  std::unique_ptr<ClothPart> part_;   ///< null: explicit steps
+  std::unique_ptr<ClothPart> part_;         ///< null: explicit steps
   /// Of the options, and of stepUndivided() if it steps otherwise; null until they are needed.
   std::unique_ptr<Island> island_, undivided_;
   std::unique_ptr<ShiftedMatrix> constant_;   ///< imex only

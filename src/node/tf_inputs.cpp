@@ -128,7 +128,8 @@ void TfInputs::warnOfLoop(Frame& frame) const
   {
     if (own_.count(parent))
       ROS_WARN(
-          "%s follows the frame %s of tf, a descendant of %s, which this node broadcasts: if the motion of %s depends on "
+          "%s follows the frame %s of tf, a descendant of %s, which this node broadcasts: if the motion of %s depends "
+          "on "
           "%s, both follow each other and may diverge",
           frame.followers.front().who.c_str(), frame.name.c_str(), parent.c_str(), parent.c_str(),
           frame.followers.front().who.c_str());

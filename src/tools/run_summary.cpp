@@ -114,8 +114,8 @@ void printSummary(const Simulation& simulation, const RunStatistics& total, cons
   if (total.repulsions > 0 || total.impulses > 0)
   {
     std::printf("cloth contacts    %.1f per step, %llu collisions stopped, %llu rigid pieces\n",
-                static_cast<double>(total.repulsions) / std::max(1.0, static_cast<double>(simulation.state().steps)), static_cast<unsigned long long>(total.impulses),
-                static_cast<unsigned long long>(total.zones));
+                static_cast<double>(total.repulsions) / std::max(1.0, static_cast<double>(simulation.state().steps)),
+                static_cast<unsigned long long>(total.impulses), static_cast<unsigned long long>(total.zones));
   }
   if (total.mended_folds > 0)
     std::printf("mended folds      %llu\n", static_cast<unsigned long long>(total.mended_folds));

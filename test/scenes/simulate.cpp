@@ -131,8 +131,9 @@ TEST_F(Simulate, tellsTheLargestStrainAndTheLoadsOfGrasps)
 
 TEST_F(Simulate, notesWhatOnlyANodeMoves)
 {
-  const std::string moved = cantilever + " --duration 0.02 --set 'rods.0.grasps={a: {edges: [0], motion: {tf: tool0}}, "
-                                         "b: {edges: [-1], motion: {topic: true}}}'";
+  const std::string moved = cantilever +
+                            " --duration 0.02 --set 'rods.0.grasps={a: {edges: [0], motion: {tf: tool0}}, "
+                            "b: {edges: [-1], motion: {topic: true}}}'";
   const std::string output = simulate(moved).output;
   EXPECT_NE(output.find("note: these stay in place"), std::string::npos) << output;
   EXPECT_NE(output.find("grasp 'a' (tf: tool0), grasp 'b' (topic)"), std::string::npos) << output;

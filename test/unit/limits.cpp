@@ -83,10 +83,9 @@ TEST(Limits, ofStrainFollowTheMaterial)
   EXPECT_EQ(defaultStrainLimit("{density: 1000, youngs_modulus: 2.0e9}"), 0.05);
   EXPECT_EQ(defaultStrainLimit("{density: 1000, youngs_modulus: 1.0e5, inextensible: true}"), 0.01);
   // 1e6 N over the section's 3.14e-4 m^2 are 3.2 GPa
-  EXPECT_EQ(
-      defaultStrainLimit("{density: 1000, youngs_modulus: 1.0e5, stretch_modulus: 1.0e6, bend_modulus: 1.0e-3, "
-                         "twist_modulus: 1.0e-3}"),
-      0.05);
+  EXPECT_EQ(defaultStrainLimit("{density: 1000, youngs_modulus: 1.0e5, stretch_modulus: 1.0e6, bend_modulus: 1.0e-3, "
+                               "twist_modulus: 1.0e-3}"),
+            0.05);
 }
 
 TEST(Limits, tellOfEachExcursionOnce)

@@ -111,7 +111,7 @@ ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& verti
 double largestRestAngle(const ClothModel& model);
 
 /// Whether isometric bending keeps the rest shape: its constant matrix acts on positions and flattens all that is
-/// curved. A shape counts as flat if no vertex is farther from a plane than two millionths of the shape's size, which is
+/// curved. A shape counts as flat if no vertex is farther from a plane than two millionths of its size, which is
 /// the precision of files with six digits, and if it is not folded onto itself.
 bool restsFlat(const ClothModel& model);
 

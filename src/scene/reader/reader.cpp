@@ -350,18 +350,18 @@ bool touchesSomething(const RodConfig& rod) { return rod.contact.has_value(); }
 bool hitsSomething(const SceneConfig& scene, const BodyConfig& body)
 {
   return !body.motion && body.shape && body.contact &&
-         (!scene.obstacles.empty() || std::any_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodyConfig& other) {
-           return &other != &body && other.shape && other.contact;
-         }));
+         (!scene.obstacles.empty() ||
+          std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                      [&](const BodyConfig& other) { return &other != &body && other.shape && other.contact; }));
 }
 
 /// The integrator of rods and bodies that touch something, or that a thread may touch.
 void checkContactTime(const YamlCursor& time, SceneConfig& scene)
 {
   const auto hits = [&](const BodyConfig& body) { return hitsSomething(scene, body); };
-  const bool flows =
-      !(scene.rods.empty() && scene.bodies.empty()) &&
-      std::any_of(scene.threads.begin(), scene.threads.end(), [](const ThreadConfig& t) { return t.contact.has_value(); });
+  const bool flows = !(scene.rods.empty() && scene.bodies.empty()) &&
+                     std::any_of(scene.threads.begin(), scene.threads.end(),
+                                 [](const ThreadConfig& t) { return t.contact.has_value(); });
   const bool touches = flows || std::any_of(scene.rods.begin(), scene.rods.end(), touchesSomething) ||
                        std::any_of(scene.bodies.begin(), scene.bodies.end(), hits);
   if (touches && !YamlMap(time).has("integrator"))
