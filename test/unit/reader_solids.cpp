@@ -54,6 +54,38 @@ std::string problemsOf(const std::vector<std::string>& overrides)
   return "";
 }
 
+/// Methods of second order make what hits something bounce.
+TEST(ReaderSolids, contactOfAnyKindMakesImplicitEulerTheDefault)
+{
+  const auto defaultOf = [](const std::string& scene) { return parseScene(scene).time.integrator; };
+  const std::string ball = "bodies: [{name: ball, mass: 1, shape: {sphere: {radius: 0.1}}",
+                    floor = "\nobstacles: [{name: floor, shape: {plane: {point: [0, 0, -1]}}}]",
+                    honey =
+                        "\nthreads: [{centerline: {straight: {from: [0, 0, 2], to: [1, 0, 2], edges: 10}}, "
+                        "radius: 0.01, contact: {}}]";
+  EXPECT_EQ(defaultOf(ball + "}]"), Integrator::tr_bdf2);
+  EXPECT_EQ(defaultOf(ball + "}]" + floor), Integrator::implicit_euler);
+  EXPECT_EQ(defaultOf(ball + ", contact: false}]" + floor), Integrator::tr_bdf2);
+  EXPECT_EQ(defaultOf(ball + ", motion: fixed}]" + floor), Integrator::tr_bdf2);
+  EXPECT_EQ(defaultOf(ball + "}, {name: other, mass: 1, shape: {sphere: {radius: 0.1}}, pose: {position: [1, 0, 0]}}]"),
+            Integrator::implicit_euler);
+  EXPECT_EQ(defaultOf(ball + "}]" + honey), Integrator::implicit_euler);
+  for (const char* const bouncy : {"bdf2", "tr_bdf2", "implicit_midpoint", "generalized_alpha"})
+  {
+    const SceneConfig scene = parseScene(ball + "}]" + floor, "test.yaml", {std::string("time.integrator=") + bouncy});
+    ASSERT_EQ(scene.warnings.size(), 1u) << bouncy;
+    EXPECT_NE(scene.warnings[0].find("may bounce higher than it fell"), std::string::npos) << scene.warnings[0];
+  }
+  EXPECT_THROW(parseScene(ball + "}]" + floor, "test.yaml", {"time.integrator=symplectic_euler"}), SceneError);
+}
+
+TEST(ReaderSolids, tellsThatContactChoosesTheIntegratorOfRodsWithoutIt)
+{
+  EXPECT_EQ(parseScene(good_scene).notes.size(), 1u);   // the ring has no contact
+  EXPECT_TRUE(parseScene(good_scene, "test.yaml", {"rods.1.contact={}"}).notes.empty());
+  EXPECT_TRUE(parseScene(good_scene, "test.yaml", {"time.integrator=implicit_euler"}).notes.empty());
+}
+
 TEST(ReaderSolids, readsContact)
 {
   const SceneConfig scene = parseScene(good_scene);
