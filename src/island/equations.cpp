@@ -99,10 +99,10 @@ void Equations::beginSubstep(double fraction)
     pattern_valid_ = pattern_valid_ && part->island == this;   // another island has numbered its unknowns
     part->island = this;
   }
-  countPoints();
   numberUnknowns();
   if (!contact_)
     return;
+  countPoints();
   placeSolids(fraction, prescribed_);
   for (const Part* part : parts_)
     part->gatherStart(points_base_);
