@@ -34,34 +34,6 @@ double ThreadVolumes::missing() const
   return all > 0 ? (all - present - left - dropped) / all : 0.0;
 }
 
-StepReport ThreadGroup::step(ThreadGroupState& state, const ThreadInputs& inputs, double duration)
-{
-  StepReport report;
-  work_ = state;
-  std::array<EndLoad, 2> loads;
-  ThreadInputs others = inputs;
-  others.flow_rate = 0.0;
-  std::uint64_t next_id = 0;
-  for (const ThreadState& thread : work_.threads)
-    next_id = std::max(next_id, thread.next_id);
-  for (ThreadState& thread : work_.threads)
-  {
-    thread.next_id = next_id;
-    report.merge(stepper_.step(thread, thread.ends[1].held ? inputs : others, duration));
-    if (!report.ok)
-      return report;
-    next_id = thread.next_id;
-    for (int end = 0; end < 2; ++end)
-      if (thread.ends[end].held)
-        loads[end] = stepper_.endLoads()[end];
-  }
-  breakThreads(work_, stepper_.model().limits);
-  dropThreads(work_, stepper_.model().limits);
-  loads_ = loads;
-  std::swap(state, work_);
-  return report;
-}
-
 void breakThreads(ThreadGroupState& state, const ThreadLimits& limits)
 {
   const double min_radius = limits.min_radius;

@@ -32,6 +32,15 @@ void checkThreadModel(const ThreadModel& model)
   check(limits.max_deposited >= 4, "limits.max_deposited", limits.max_deposited, "4 or more nodes");
 }
 
+void checkLoneThread(const ThreadModel& model)
+{
+  checkThreadModel(model);
+  if (model.floor.slips())
+    throw std::invalid_argument(
+        "thread '" + model.name + "': floor.friction is " + std::to_string(model.floor.friction) +
+        ", but on a floor that slips a thread needs contact: give it one, for example contact: {}");
+}
+
 ThreadState makeThread(const Eigen::Matrix3Xd& nodes, const Eigen::VectorXd& radii, const Eigen::Vector3d& director)
 {
   const int n = static_cast<int>(nodes.cols());

@@ -102,14 +102,10 @@ std::pair<double, double> rangeOfRadii(const ThreadState& state)
 ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton,
                              Integrator integrator)
 {
-  checkThreadModel(*model);
+  checkLoneThread(*model);
   if (integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler)
     throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) +
                                 ", allowed: implicit_euler, symplectic_euler");
-  if (model->floor.slips())
-    throw std::invalid_argument(
-        "thread '" + model->name + "': floor.friction is " + std::to_string(model->floor.friction) +
-        ", but on a floor that slips a thread needs contact: give it one, for example contact: {}");
   impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
   alone_ = std::make_unique<Alone>(*impl_);
 }

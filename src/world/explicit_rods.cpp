@@ -3,7 +3,7 @@
 
 #include "rod/explicit_system.h"
 #include "world_statics.h"
-#include "rod_groups.h"
+#include "explicit_rods.h"
 
 namespace slender {
 

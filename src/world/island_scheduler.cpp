@@ -19,9 +19,16 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   };
   for (const int b : content.bodies)
     checkBody(world.bodies[b].body);
+  bool touching_threads = false;
   for (const int k : content.threads)
   {
     const ThreadModel& model = *world.threads[k].model;
+    if (!world.threads[k].contact)
+    {
+      checkLoneThread(model);
+      continue;
+    }
+    touching_threads = true;
     const double friction = world.threads[k].contact->friction, merging = world.threads[k].merging;
     checkThreadModel(model);
     const auto check_value = [&](bool good, const char* what, double value, const char* range) {
@@ -36,7 +43,7 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   need(world.time.integrator != Integrator::symplectic_euler || !simulates,
        "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler "
        "(time.integrator)");
-  need(content.threads.empty() || !simulates || world.time.integrator == Integrator::implicit_euler,
+  need(!touching_threads || !simulates || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
   return content;
@@ -99,6 +106,9 @@ StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInput
 {
   if (!objects_.cloths.empty())
     throw std::invalid_argument("cloth with contact has no statics");
+  for (const RodObject& rod : objects_.rods)
+    if (rod.constraints)
+      throw std::invalid_argument("a rod that tracks a guide has no statics");
   return solveStatics(objects_, loop_.threads, state, inputs);
 }
 

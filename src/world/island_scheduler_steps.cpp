@@ -14,7 +14,7 @@ bool IslandScheduler::endsHaveRoom(const WorldState& state, const WorldInputs& i
 {
   for (const ThreadObject& thread : objects_.threads)
     for (const ThreadState& strand : state.threads[thread.index].threads)
-      for (int end = 0; end < 2 && thread.model.contact->solids; ++end)
+      for (int end = 0; end < 2 && thread.reach().solids; ++end)
       {
         const Eigen::Vector3d from = end ? strand.x.back() : strand.x.front(),
                               to = inputs.threads[thread.index].ends[end].position;
@@ -162,8 +162,10 @@ StepReport IslandScheduler::step(WorldState& state, const WorldInputs& inputs)
   return report;
 }
 
-void IslandScheduler::finish(WorldState& state, const WorldInputs&, StepReport&)
+void IslandScheduler::finish(WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
+  for (const RodObject& rod : objects_.rods)
+    rod.finishGuide(inputs, state, report);
   for (const ThreadObject& thread : objects_.threads)
     state.end_loads[thread.index] = thread.loads;
 }

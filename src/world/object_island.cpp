@@ -29,7 +29,7 @@ ObjectIsland::ObjectIsland(WorldObjects& objects, const std::vector<int>& places
     shared_(objects),
     places_(places),
     guard_(world_.contact.gap),
-    swept_(places.size()),
+    swept_(places.size(), BoundingBox::empty()),
     island_(timeOf(time, holds<ThreadObject>(objects, places) || holds<ClothObject>(objects, places)),
             holds<ThreadObject>(objects, places))
 {
@@ -167,8 +167,12 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
   if (threads_.empty())
     return;
   setParts();
-  setStrands();
+  if (contact())
+    setStrands();
 }
+
+/// Whether neither contact nor joints connect its parts.
+bool ObjectIsland::isDivisible() const { return !contact() && rods_.empty() && bodies_.empty(); }
 
 /// Those of the present step.
 void ObjectIsland::setStrands()
@@ -194,7 +198,15 @@ StepReport ObjectIsland::step(double duration)
     if (const double own = rod->stepper->work.next_step; own > 0.0)
       first = first > 0.0 ? std::min(first, own) : own;
   StepReport report;
-  if (!parts_.empty())   // a thread may have left its region
+  const bool divisible = isDivisible();
+  for (std::size_t k = 0; divisible && k < parts_.size() && report.ok; ++k)
+  {
+    single_ = {parts_[k]};
+    island_.setParts(single_);
+    double whole_step = 0.0;
+    report.merge(island_.step(duration, whole_step));
+  }
+  if (!divisible && !parts_.empty())   // a thread may have left its region
     report = island_.step(duration, first);
   stepped_ = report.ok;
   if (!report.ok)
@@ -208,6 +220,8 @@ StepReport ObjectIsland::step(double duration)
 /// The boxes of its objects from those of their parts.
 void ObjectIsland::trace()
 {
+  if (!contact())
+    return;
   for (std::size_t k = 0, member = 0; k < objects_.size(); ++k)
   {
     swept_[k] = BoundingBox::empty();

@@ -9,7 +9,8 @@
 
 namespace slender {
 
-/// Some of the objects that may meet, whose parts are minimised together in a step, with their contact.
+/// Some of the objects that may meet, whose parts are minimised together in a step, with their contact. The strands of
+/// a thread that touches nothing are stepped one after the other.
 class ObjectIsland
 {
 public:
@@ -46,6 +47,7 @@ private:
   void setSolids(const WorldState& state, const WorldInputs& inputs);
   void setParts();
   void setStrands();
+  bool isDivisible() const;
   void trace();
 
   const WorldModel& world_;
@@ -59,7 +61,7 @@ private:
   int nodes_ = 0;                           ///< of its rods
   ThreadGuard guard_;
   ThreadMerging merging_;
-  std::vector<Part*> parts_;
+  std::vector<Part*> parts_, single_;
   std::vector<std::size_t> parts_end_;   ///< per object: its parts end before this one
   std::vector<ThreadPart*> strands_;     ///< of the present step
   std::vector<ThreadGuard::Strand> guarded_;

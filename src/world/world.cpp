@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <exception>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "cloth_groups.h"
 #include "island_scheduler.h"
-#include "rod_groups.h"
+#include "explicit_rods.h"
 #include "group_loop.h"
-#include "thread_groups.h"
 #include "tracked_parts.h"
 
 namespace slender {
@@ -27,6 +27,12 @@ using Kind = FailurePlace::Kind;
 bool meetsByBarrier(const WorldModel::Cloth& cloth)
 {
   return cloth.contact && cloth.contact->method == ContactMethod::barrier;
+}
+
+template <class Objects>
+bool anyTouches(const Objects& objects)
+{
+  return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.contact.has_value(); });
 }
 
 /// Calls `make`; what it throws becomes an error of the part.
@@ -57,10 +63,10 @@ public:
       rods(model.rods.size()),
       cloths(model.cloths.size())
   {
-    addThreads(state);
+    checkThreads();
     addCloths(true);
     addCloths(false);
-    addRods(state);
+    addIslands(state);
     checkCloths(state);
   }
 
@@ -154,33 +160,6 @@ private:
     return groups_.back().get();
   }
 
-  void addThreads(WorldState& state)
-  {
-    for (int k = 0; k < static_cast<int>(model.threads.size()); ++k)
-    {
-      if (model.threads[k].contact)
-      {
-        built(Kind::thread, k, [&] { checkThreadModel(*model.threads[k].model); });
-        touching_threads_.push_back(k);
-      }
-      else
-      {
-        add(built(Kind::thread, k, [&] { return makeLoneThread(model, k); }));
-      }
-    }
-    const auto touches = [](const auto& part) { return part.contact.has_value(); };
-    const auto shown = [](const WorldModel::Body& body) { return body.shape.has_value(); };
-    const auto joins = [](const WorldModel::Cloth& cloth) { return meetsByBarrier(cloth); };
-    if (touching_threads_.empty() || std::any_of(model.rods.begin(), model.rods.end(), touches) ||
-        std::any_of(model.bodies.begin(), model.bodies.end(), shown) ||
-        std::any_of(model.cloths.begin(), model.cloths.end(), joins))
-      return;   // addRods() joins them with the others
-    add(built(Kind::none, -1, [&] {
-      return std::make_unique<IslandScheduler>(model, WorldContent{{}, touching_threads_, {}, {}}, state);
-    }));
-    touching_threads_.clear();
-  }
-
   /// Cloths that lead others, or those that do not. Leaders are stepped first, and feel only each other.
   void addCloths(bool leaders)
   {
@@ -201,44 +180,56 @@ private:
     place(cloths, touching, add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); })));
   }
 
-  /// Rods, and all that the barrier of contact may join with them.
-  void addRods(WorldState& state)
+  void checkThreads() const
   {
-    std::vector<int> meeting, alone;
+    for (int k = 0; k < static_cast<int>(model.threads.size()); ++k)
+      built(Kind::thread, k, [&] {
+        model.threads[k].contact ? checkThreadModel(*model.threads[k].model) : checkLoneThread(*model.threads[k].model);
+      });
+  }
+
+  /// Rods, threads, simulated bodies, and cloths whose contact is the barrier. In explicit steps of rods, threads and
+  /// cloths have a group of their own.
+  void addIslands(WorldState& state)
+  {
+    WorldContent content;
+    content.cloths = barrier_cloths_;
+    content.threads.resize(model.threads.size());
+    std::iota(content.threads.begin(), content.threads.end(), 0);
+    std::vector<int> alone;
     for (int r = 0; r < static_cast<int>(model.rods.size()); ++r)
-    {
-      (meetsOthers(model, r) ? meeting : alone).push_back(r);
-      if (model.rods[r].tracked.sets && meetsOthers(model, r))
-        throw WorldError(Kind::rod, r, "a rod that tracks a guide has no contact and no welds: leave out one of them");
-    }
+      (meetsOthers(model, r) ? content.rods : alone).push_back(r);
     const std::vector<int> bodies = bodiesThatMeet();
-    const bool simulated =
-        std::any_of(bodies.begin(), bodies.end(), [this](int b) { return model.bodies[b].body.simulated; });
-    const bool meet = !meeting.empty() || simulated || !touching_threads_.empty() || !barrier_cloths_.empty();
-    const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
-    WorldContent content{meeting, touching_threads_, meet ? bodies : std::vector<int>{}, barrier_cloths_};
+    const bool touching = !barrier_cloths_.empty() || anyTouches(model.threads);
+    if (touching || !content.rods.empty() ||
+        std::any_of(bodies.begin(), bodies.end(), [this](int b) { return model.bodies[b].body.simulated; }))
+      content.bodies = bodies;
     separate_begin_ = groups_.size();
-    for (const int r : alone)
-    {
-      if (model.rods[r].tracked.sets)
-        addSeparate(r, [&] { return makeTrackedRod(model, r); });
-      else if (explicit_steps)
+    const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
+    if (explicit_steps)
+      for (const int r : alone)
         addSeparate(r, [&] { return makeExplicitRods(model, {{r}, {}, {}, {}}, state); });
-      else
-        content.rods.push_back(r);
-    }
+    else
+      content.rods.insert(content.rods.end(), alone.begin(), alone.end());
     separate_end_ = groups_.size();
-    if (!meet && content.rods.empty())
-      return;
-    if (explicit_steps && touching_threads_.empty() && barrier_cloths_.empty())
+    const bool shown = std::any_of(model.bodies.begin(), model.bodies.end(),
+                                   [](const WorldModel::Body& body) { return body.shape.has_value(); });
+    const bool joined = !barrier_cloths_.empty() || (touching && (anyTouches(model.rods) || shown));
+    if (explicit_steps && !joined)
     {
-      place(rods, content.rods, add(built(Kind::none, -1, [&] { return makeExplicitRods(model, content, state); })));
-      return;
+      if (!content.rods.empty() || !content.bodies.empty())
+        place(rods, content.rods, add(built(Kind::none, -1, [&] {
+                return makeExplicitRods(model, {content.rods, {}, content.bodies, {}}, state);
+              })));
+      content.rods.clear();
+      content.bodies.clear();
     }
+    if (content.rods.empty() && content.threads.empty() && content.bodies.empty() && content.cloths.empty())
+      return;
     StepGroup* group =
         add(built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); }));
     place(rods, content.rods, group);
-    place(cloths, barrier_cloths_, group);
+    place(cloths, content.cloths, group);
   }
 
   /// Simulated ones, and driven ones that rods are welded to or that have a shape.
@@ -300,15 +291,14 @@ private:
       move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
   }
 
-  /// In the order in which they step: threads, cloths that lead others, other cloths, rods that track or take explicit
-  /// steps and meet nothing, all others.
+  /// In the order in which they step: cloths that lead others, other cloths, rods that take explicit steps and meet
+  /// nothing, all others.
   std::vector<std::unique_ptr<StepGroup>> groups_;
   std::size_t separate_begin_ = 0, separate_end_ = 0;   ///< among them the rods that meet nothing
   int separate_nodes_ = 0;
-  std::vector<int> touching_threads_;   ///< that are joined with rods, cloths or bodies
-  std::vector<int> barrier_cloths_;     ///< whose contact is the barrier
-  std::vector<int> given_bodies_;       ///< driven bodies
-  WorldState before_;                   ///< a step that may fail in one of several groups
+  std::vector<int> barrier_cloths_;   ///< whose contact is the barrier
+  std::vector<int> given_bodies_;     ///< driven bodies
+  WorldState before_;                 ///< a step that may fail in one of several groups
   GroupLoop separate_loop_;
 };
 

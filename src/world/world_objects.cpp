@@ -39,6 +39,21 @@ bool meetsSolids(const WorldModel& world, int body)
 
 bool touches(const WorldModel::Rod& rod) { return rod.contact.has_value(); }
 
+std::shared_ptr<const WeakConstraints> constraintsOf(const WorldModel::Rod& rod)
+{
+  return rod.tracked.sets ? rod.tracked.sets->front().constraints : nullptr;
+}
+
+/// Throws std::invalid_argument if a rod cannot track its guide in these steps.
+void checkTracking(const TimeConfig& time, const std::string& rod, bool meets)
+{
+  const std::string who = "rod '" + rod + "': ";
+  if (meets)
+    throw std::invalid_argument(who + "a rod that tracks a guide has no contact and no welds: leave out one of them");
+  if (time.integrator != Integrator::implicit_euler || time.error_tolerance > 0)
+    throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler, with fixed steps");
+}
+
 /// The bodies, and the rods that may meet something.
 WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
 {
@@ -115,20 +130,42 @@ RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time
   : WorldObject(number),
     whole(std::make_unique<RodStepper>(world.rods[number].model, time)),
     stepper(&whole->impl()),
-    part(std::make_unique<RodPart>(*stepper, touches(world.rods[number]))),
+    constraints(constraintsOf(world.rods[number])),
+    part(constraints ? std::make_unique<AveragedPart>(*stepper, constraints->matrix())
+                     : std::make_unique<RodPart>(*stepper, touches(world.rods[number]))),
     meets(meetsOthers(world, number)),
     contact_(world.rods[number].contact),
+    averages_(dynamic_cast<AveragedPart*>(part.get())),
+    guide_size_(world.rods[number].tracked.size),
     duration_(world.time.step)
 {
+  if (constraints)
+    checkTracking(world.time, stepper->model->name, meets);
   if (contact_)
     part->setContact(*contact_, world.rods[number].ignored);
 }
 
-bool RodObject::load(const WorldState& state, const WorldInputs&, StepReport&)
+bool RodObject::load(const WorldState& state, const WorldInputs& with, StepReport& report)
 {
   stepper->begin(state.rods[index]);
   part->begin(inputs, duration_);
+  if (!averages_)
+    return true;
+  constraints->averages(with.rod_guides[index], targets_);
+  if (!targets_.allFinite())
+    return refuseInput(name() + ": its guide", report);
+  averages_->setTargets(targets_);
   return true;
+}
+
+void RodObject::finishGuide(const WorldInputs& with, WorldState& state, StepReport& report) const
+{
+  if (!averages_)
+    return;
+  state.rod_guides[index].points = with.rod_guides[index];
+  state.rod_guides[index].forces = averages_->forces;
+  report.tracking_error =
+      std::max(report.tracking_error, constraints->error(targets_, state.rods[index].x) / guide_size_);
 }
 
 IslandFinder::Reach RodObject::reach() const
@@ -239,7 +276,8 @@ void ThreadObject::makeStrands(std::size_t count)
     Strand added;
     added.stepper = std::make_unique<ThreadStepper::Impl>(model.model, time_.newton, false);
     added.part = std::make_unique<ThreadPart>(*added.stepper);
-    added.part->setContact(*model.contact, model.merging, index);
+    if (model.contact)
+      added.part->setContact(*model.contact, model.merging, index);
     strands_.push_back(std::move(added));
   }
 }
@@ -252,7 +290,8 @@ void ThreadObject::addParts(std::vector<Part*>& parts)
 
 IslandFinder::Reach ThreadObject::reach() const
 {
-  return {true, model.contact->others, model.contact->solids, false, BoundingBox::empty()};
+  const auto& contact = model.contact;
+  return {contact.has_value(), contact && contact->others, contact && contact->solids, false, BoundingBox::empty()};
 }
 
 void ThreadObject::finish(WorldState& state)
@@ -275,6 +314,8 @@ void ThreadObject::finish(WorldState& state)
 
 void ThreadObject::addTo(Meeting& meeting, const WorldState& state)
 {
+  if (!model.contact)
+    return;
   const std::vector<ThreadState>& threads = state.threads[index].threads;
   makeStrands(threads.size());
   for (std::size_t s = 0; s < threads.size(); ++s)

@@ -8,6 +8,7 @@
 
 #include "cloth/cloth_part.h"
 #include "island/island.h"
+#include "rod/averaged_part.h"
 #include "rod/rod_part.h"
 #include "thread/thread_part.h"
 #include "island_finder.h"
@@ -61,18 +62,24 @@ public:
   double& stiffness(WorldState& state) const override { return state.contact_stiffness.rods[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;
 
-  /// Null: it may meet others.
-  RodStepper* alone() { return meets ? nullptr : whole.get(); }
+  /// Null: it may meet others, or tracks a guide.
+  RodStepper* alone() { return meets || averages_ ? nullptr : whole.get(); }
+  /// Of a rod that tracks a guide, after a step: writes the guide and its forces into the state.
+  void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const;
 
   const std::unique_ptr<RodStepper> whole;
-  RodStepper::Impl* const stepper;   ///< of `whole`
+  RodStepper::Impl* const stepper;                            ///< of `whole`
+  const std::shared_ptr<const WeakConstraints> constraints;   ///< null: tracks nothing
   const std::unique_ptr<RodPart> part;
   RodInputs inputs;   ///< of the present step, with the targets of grasps that driven bodies carry
   const bool meets;   ///< contact or welds may let it meet others
 
 private:
   const std::optional<ContactProperties>& contact_;
-  const double duration_;   ///< of a step [s]
+  AveragedPart* const averages_;   ///< the part of a rod that tracks a guide
+  Eigen::Matrix3Xd targets_;       ///< of its averages at the end of the step [m]
+  const double guide_size_;        ///< [m]
+  const double duration_;          ///< of a step [s]
 };
 
 /// A simulated body.

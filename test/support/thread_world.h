@@ -20,8 +20,8 @@ struct ThreadWorld
     model.contact.least_stiffness = 1e-8;
     model.time.step = step;
   }
-  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in, const ContactProperties& contact = {},
-           double merging = 0.0)
+  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in,
+           const std::optional<ContactProperties>& contact = ContactProperties{}, double merging = 0.0)
   {
     model.threads.push_back({std::make_shared<ThreadModel>(m), contact, merging});
     state.threads.emplace_back();

@@ -197,7 +197,7 @@ TEST(TouchingThreads, MergedThreadsStayAtTheDistanceAskedFor)
   EXPECT_LT(pair.distance(), 0.6 * 2 * r + pair.model.contact.gap);
 }
 
-TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
+TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfALoneThread)
 {
   for (const bool merging : {false, true})   // it has nothing to do with itself as long as it falls
   {
@@ -210,19 +210,19 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfAGroup)
     ThreadWorld touching(3e-4, 0.002);
     touching.add(m, t.state, t.inputs, {}, merging ? 0.6 : 0.0);
     World threads(touching.model, touching.state);
-    ThreadGroup group(std::make_shared<ThreadModel>(m), NewtonConfig{});
-    ThreadGroupState alone;
-    alone.threads.push_back(t.state);
+    ThreadWorld lone(3e-4, 0.002);
+    lone.add(m, t.state, t.inputs, std::nullopt);
+    World one(lone.model, lone.state);
     for (int k = 0; k < 100; ++k)
     {
       ASSERT_TRUE(threads.step(touching.state, touching.inputs).ok);
-      ASSERT_TRUE(group.step(alone, t.inputs, 0.002).ok);
-      const ThreadState &s = touching.state.threads[0].threads[0], &a = alone.threads[0];
+      ASSERT_TRUE(one.step(lone.state, lone.inputs).ok);
+      const ThreadState &s = touching.thread(0), &a = lone.thread(0);
       ASSERT_EQ(s.id, a.id);
       for (int i = 0; i < s.nodes(); ++i)
         ASSERT_LT((s.x[i] - a.x[i]).norm(), 1e-9) << k;
     }
-    EXPECT_GT(alone.threads[0].nodes(), 4);
+    EXPECT_GT(lone.thread(0).nodes(), 4);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include "slender_sim/thread/thread_group.h"
 #include "slender_sim/thread/thread_remesh.h"
+#include "slender_sim/world/world.h"
 #include "test/support/threads.h"
 
 namespace slender::test {
@@ -53,15 +54,44 @@ struct Dripping
   }
 };
 
+/// Steps a thread that touches nothing but its floor, and all that has broken off it.
+class LoneThread
+{
+public:
+  LoneThread(const ThreadModel& model, ThreadGroupState& state, double step) : state_(state)
+  {
+    WorldModel of;
+    of.time.step = step;
+    of.threads.push_back({std::make_shared<ThreadModel>(model), {}, 0.0});
+    whole_.threads.resize(1);
+    whole_.end_loads.resize(1);
+    world_ = std::make_unique<World>(of, whole_);
+  }
+  StepReport step(const ThreadInputs& inputs)
+  {
+    std::swap(whole_.threads[0], state_);
+    WorldInputs with;
+    with.threads = {inputs};
+    const StepReport report = world_->step(whole_, with);
+    std::swap(whole_.threads[0], state_);
+    return report;
+  }
+
+private:
+  ThreadGroupState& state_;
+  WorldState whole_;
+  std::unique_ptr<World> world_;
+};
+
 TEST(ThreadGroup, AThreadThatDripsBreaksAndNoFluidIsLost)
 {
   Dripping d;
-  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  LoneThread thread(d.model, d.state, 0.002);
   const double start = d.state.volumeBalance();
   std::size_t most = 0;
   for (int k = 0; k < 700; ++k)
   {
-    const StepReport report = group.step(d.state, d.inputs, 0.002);
+    const StepReport report = thread.step(d.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     most = std::max(most, d.state.threads.size());
     ASSERT_TRUE(d.state.threads[0].ends[1].held);
@@ -84,14 +114,14 @@ TEST(ThreadGroup, AThreadThatDripsBreaksAndNoFluidIsLost)
 TEST(ThreadGroup, AFailureLeavesAllThreads)
 {
   Dripping d;
-  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  LoneThread thread(d.model, d.state, 0.002);
   for (int k = 0; k < 10; ++k)
-    ASSERT_TRUE(group.step(d.state, d.inputs, 0.002).ok);
+    ASSERT_TRUE(thread.step(d.inputs).ok);
   d.state.threads.push_back(d.state.threads[0]);
   d.state.threads[1].ends[1].held = false;
   d.state.threads[1].volume[0] = -1;
   const ThreadState before = d.state.threads[0];
-  EXPECT_FALSE(group.step(d.state, d.inputs, 0.002).ok);
+  EXPECT_FALSE(thread.step(d.inputs).ok);
   EXPECT_TRUE(sameThread(d.state.threads[0], before));
 }
 
@@ -100,12 +130,12 @@ TEST(ThreadGroup, WhatLeavesTheSceneIsDropped)
   Dripping d;
   d.model.floor.present = false;
   d.model.limits.scene.min().z() = 0.0;
-  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  LoneThread thread(d.model, d.state, 0.002);
   const double start = d.state.volumeBalance();
   std::size_t most = 0, nodes = 0;
   for (int k = 0; k < 4000; ++k)
   {
-    ASSERT_TRUE(group.step(d.state, d.inputs, 0.002).ok) << k;
+    ASSERT_TRUE(thread.step(d.inputs).ok) << k;
     most = std::max(most, d.state.threads.size());
     nodes = std::max(nodes, d.state.threads[0].x.size());
   }
@@ -126,10 +156,10 @@ TEST(ThreadGroup, APieceThatComesToRestKeepsTheNodesThatMayLie)
   piece.thread_id = d.state.next_thread_id++;
   d.state.threads = {piece};
   d.inputs.flow_rate = 0.0;
-  ThreadGroup group(std::make_shared<ThreadModel>(d.model), NewtonConfig{});
+  LoneThread thread(d.model, d.state, 0.005);
   const double start = d.state.volumeBalance();
   for (int k = 0; k < 200; ++k)
-    ASSERT_TRUE(group.step(d.state, d.inputs, 0.005).ok);
+    ASSERT_TRUE(thread.step(d.inputs).ok);
   ASSERT_EQ(d.state.threads.size(), 1u);
   EXPECT_EQ(d.state.threads[0].nodes(), 9);
   for (const char deposited : d.state.threads[0].deposited)

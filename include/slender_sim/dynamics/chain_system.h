@@ -7,6 +7,7 @@
 
 #include "slender_sim/dynamics/chain_configuration.h"
 #include "slender_sim/dynamics/hessian_shift.h"
+#include "slender_sim/dynamics/step_report.h"
 #include "slender_sim/energy/chain_term.h"
 #include "slender_sim/linalg/cyclic_banded_ldlt.h"
 

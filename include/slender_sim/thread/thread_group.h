@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "slender_sim/thread/thread_stepper.h"
+#include "slender_sim/thread/thread_model.h"
 
 namespace slender {
 
@@ -41,27 +41,5 @@ struct ThreadVolumes
 /// scene, and the oldest of those that only lie about.
 void breakThreads(ThreadGroupState& state, const ThreadLimits& limits);
 void dropThreads(ThreadGroupState& state, const ThreadLimits& limits);
-
-/// Steps a thread that may break (ThreadLimits::min_radius), and all that has broken off it.
-class ThreadGroup
-{
-public:
-  /// Throws std::invalid_argument for a model that is not valid.
-  ThreadGroup(std::shared_ptr<const ThreadModel> model, const NewtonConfig& newton) : stepper_(std::move(model), newton)
-  {
-  }
-
-  /// Advances all threads by `duration` [s]; the inputs are common, held ends and the flow concern the thread that has
-  /// them. On failure the state is untouched and the report says why.
-  StepReport step(ThreadGroupState& state, const ThreadInputs& inputs, double duration);
-
-  /// On the holders of the ends, as of the last successful step.
-  const std::array<EndLoad, 2>& endLoads() const { return loads_; }
-
-private:
-  ThreadStepper stepper_;
-  ThreadGroupState work_;
-  std::array<EndLoad, 2> loads_;
-};
 
 }   // namespace slender

@@ -33,7 +33,7 @@ struct ThreadLimits
   double highest_edge_length = 0.0;                            ///< [m] without effect below max_edge_length
   double max_step = std::numeric_limits<double>::infinity();   ///< [s] longer steps are taken in several
   double min_edge_length = 0.0;                                ///< [m] shorter edges are joined to a neighbour
-  /// [m] a thinner edge breaks: ThreadGroup then has one thread more
+  /// [m] a thinner edge breaks: see breakThreads()
   double min_radius = 0.0;
   /// nodes older than the youngest one on the floor; more are dropped
   int max_deposited = std::numeric_limits<int>::max();
@@ -60,6 +60,8 @@ struct ThreadModel
 
 /// Throws std::invalid_argument naming the bad value.
 void checkThreadModel(const ThreadModel& model);
+/// The same for a thread without contact, whose floor must not slip.
+void checkLoneThread(const ThreadModel& model);
 
 /// A thread at rest through `nodes` (3 x n, n >= 2, from the oldest to the newest [m]) with edge radii [m] (n-1),
 /// twist-free frames from `director` (zero: any normal). Ends are free. Throws std::invalid_argument naming the bad

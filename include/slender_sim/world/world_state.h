@@ -10,6 +10,7 @@
 #include "slender_sim/rod/rod_state.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/thread/thread_group.h"
+#include "slender_sim/thread/thread_stepper.h"
 #include "slender_sim/tracking/function_blend.h"
 
 namespace slender {

@@ -10,7 +10,7 @@
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/state_bytes.h"
 #include "study/framework/cpu_clock.h"
-#include "slender_sim/thread/thread_group.h"
+#include "slender_sim/world/world.h"
 #include "study/framework/stability.h"
 #include "thread_cases.h"
 
@@ -52,17 +52,25 @@ using Motion = std::function<void(double time, ThreadInputs& inputs)>;
 Verdict run(const ThreadSetup& setup, double h, int steps, const Motion& motion)
 {
   Verdict v;
-  ThreadGroupState state;
+  WorldModel model;
+  model.time.step = h;
+  model.threads.push_back({std::make_shared<ThreadModel>(setup.model), {}, 0.0});
+  WorldState whole;
+  whole.threads.resize(1);
+  whole.end_loads.resize(1);
+  WorldInputs all;
+  all.threads = {setup.inputs};
+  World world(model, whole);
+  ThreadGroupState& state = whole.threads[0];
+  ThreadInputs& inputs = all.threads[0];
   state.threads = {setup.state};
-  ThreadInputs inputs = setup.inputs;
-  ThreadGroup group(std::make_shared<ThreadModel>(setup.model), NewtonConfig{});
   const double start = state.volumeBalance(), begin = threadSeconds();
   double fed = 0.0;
   for (int k = 0; k < steps; ++k)
   {
     motion((k + 1) * h, inputs);
     const ThreadGroupState before = state;
-    const StepReport report = group.step(state, inputs, h);
+    const StepReport report = world.step(whole, all);
     v.folds += report.mended_folds;
     if (!v.cell.took(report, isFinite(state), stateBytes(before) == stateBytes(state)))
       break;
