@@ -17,7 +17,7 @@ using visualization_msgs::MarkerArray;
 using Points = std::vector<Eigen::Vector3d>;
 
 constexpr double kFieldOfView = M_PI / 4;   // [rad] vertical angle of rviz's camera
-constexpr double kFilled = 0.6;             // part of the picture that the points fill
+constexpr double kFilled = 0.45;            // part of the picture that the points fill
 constexpr double kSurroundings = 3.0;       // solids larger than this multiple of the objects are not shown whole
 constexpr double kSmallest = 1e-3;          // [m] smallest size of a useful picture
 

@@ -21,7 +21,7 @@
 /// shows these pictures to ~/.ros, and then executes rviz in its place.
 namespace {
 
-constexpr double kPatience = 20.0;   // [s] time after which rviz opens without a picture
+constexpr double kPatience = 60.0;   // [s] time after which rviz opens without a picture
 constexpr double kTogether = 0.5;    // [s] time in which the pictures of several nodes arrive
 
 std::string textOf(const std::string& path)

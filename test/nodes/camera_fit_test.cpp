@@ -56,7 +56,7 @@ TEST_P(Camera, FitsTheScene)
                               false);
   const std::vector<Eigen::Vector3d> points = pointsToShow(sceneMarkers(simulation, std_msgs::Header(), {}));
   const Filled part = filled(points, fittedView(points, usualView(), kAspect));
-  EXPECT_NEAR(std::max(part.width, part.height), 0.6, 0.01);
+  EXPECT_NEAR(std::max(part.width, part.height), 0.45, 0.01);
   EXPECT_NEAR(part.x, 0.0, 0.01);
   EXPECT_NEAR(part.y, 0.0, 0.01);
 }
@@ -74,7 +74,7 @@ TEST(CameraFit, ServesPointsOfAllKinds)
   for (const auto& points : clouds)
   {
     const Filled part = filled(points, fittedView(points, usualView(), kAspect));
-    EXPECT_NEAR(std::max(part.width, part.height), 0.6, 0.01) << points[0].transpose();
+    EXPECT_NEAR(std::max(part.width, part.height), 0.45, 0.01) << points[0].transpose();
   }
   const std::vector<Eigen::Vector3d> towards_eye = {{0.3, -0.9, 0.2}, {-0.3, 0.9, -0.2}};
   const Filled part = filled(towards_eye, fittedView(towards_eye, usualView(), kAspect));
