@@ -296,7 +296,8 @@ TEST_F(Simulate, writesTablesOfChosenNodes)
   EXPECT_EQ(rows("/ends/grasps.csv"), rows("/all/grasps.csv"));
   const Result wrong = simulate(run + "/wrong --set record.nodes=[0,11]");
   EXPECT_EQ(wrong.status, 2);
-  EXPECT_NE(wrong.output.find("record.nodes.1 = 11: is out of range; must be a number in [-11, 10]"), std::string::npos)
+  EXPECT_NE(wrong.output.find("record.nodes.1 = 11: is out of range; must be a whole number in [-11, 10]"),
+            std::string::npos)
       << wrong.output;
   EXPECT_FALSE(fs::exists(folder_ + "/wrong"));
 }

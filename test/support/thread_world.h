@@ -20,10 +20,17 @@ struct ThreadWorld
     model.contact.least_stiffness = 1e-8;
     model.time.step = step;
   }
-  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in,
-           const std::optional<ContactProperties>& contact = ContactProperties{}, double merging = 0.0)
+  void add(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in, const ContactProperties& contact = {},
+           double merging = 0.0)
   {
-    model.threads.push_back({std::make_shared<ThreadModel>(m), contact, merging});
+    addLone(m, s, in);
+    model.threads.back().contact = contact;
+    model.threads.back().merging = merging;
+  }
+  /// A thread that touches nothing but its floor.
+  void addLone(const ThreadModel& m, const ThreadState& s, const ThreadInputs& in)
+  {
+    model.threads.push_back({std::make_shared<ThreadModel>(m), {}, 0.0});
     state.threads.emplace_back();
     state.threads.back().threads.push_back(s);
     state.end_loads.emplace_back();

@@ -416,9 +416,14 @@ TEST(ClothPart, LimitsTurnsOfEdges)
   Part& part = begun.part;
   part.numberUnknowns();
   VectorXd d = VectorXd::Zero(part.unknowns());
+  d[part.base(20) + 2] = 0.5;   // [m], far more than an edge
+  part.takeDirection(d.data());
+  EXPECT_EQ(part.stepLimit(), 1.0);   // without contact
+  begun.part.setContact({}, kStep);
+  d[part.base(20) + 2] = 0.0;
   part.takeDirection(d.data());
   EXPECT_EQ(part.stepLimit(), 1.0);
-  d[part.base(20) + 2] = 0.5;   // [m], far more than an edge
+  d[part.base(20) + 2] = 0.5;
   part.takeDirection(d.data());
   const double edge = begun.part.stages().shortestEdge();
   EXPECT_DOUBLE_EQ(part.stepLimit(), 0.7 * edge / 0.5);

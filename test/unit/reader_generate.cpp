@@ -230,7 +230,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"generate: [{chain: {}, tree: {}}]", "must be one of"},
         Case{"generate: [{bush: {}}]", "bush: unknown key"},
         Case{"generate: [{chain: {links: 0}}]",
-             "generate.0.chain.links = 0: is out of range; must be a number in [1, 10000]"},
+             "generate.0.chain.links = 0: is out of range; must be a whole number in [1, 10000]"},
         Case{"generate: [{chain: {spacing: 0.05}}]",
              "spacing = 0.05: is out of range; must be a number in (0.055, 0.09) m"},
         Case{"generate: [{chain: {cross_section: {radius: 0.02}}}]",

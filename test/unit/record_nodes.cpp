@@ -68,14 +68,14 @@ TEST_P(BadRecordNodes, AreReported)
 
 INSTANTIATE_TEST_SUITE_P(
     Cases, BadRecordNodes,
-    testing::Values(Case{kRope, "[11]", "must be a number in [-11, 10]"},
+    testing::Values(Case{kRope, "[11]", "must be a whole number in [-11, 10]"},
                     Case{kRope, "{rope: [3..11]}", "must be FIRST..LAST with whole numbers in [-11, 10]"},
                     Case{kRope, "[1.5]", "must be a whole number"}, Case{kRope, "[2, 1..3]", "names node 2 twice"},
                     Case{kRope, "3", "must be a list"},
                     Case{kRope, "{rop: [0]}", "is no rod or cloth of the scene (did you mean rope?)"},
                     Case{kMixed, "[0]", "this one has 3 rods, cloths and threads; must be a map"},
-                    Case{kMixed, "{flag: [9]}", "must be a number in [-9, 8]"},
-                    Case{kMixed, "{ring: [8]}", "must be a number in [-8, 7]"},
+                    Case{kMixed, "{flag: [9]}", "must be a whole number in [-9, 8]"},
+                    Case{kMixed, "{ring: [8]}", "must be a whole number in [-8, 7]"},
                     Case{kThread, "{honey: [0]}", "is a thread, whose nodes are made and dropped"},
                     Case{kThread, "[0]", "threads are written whole"},
                     Case{kRope + "cloths:\n  - {name: rope, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: [2, 2]}}\n",

@@ -211,7 +211,7 @@ TEST(TouchingThreads, WhileNothingTouchesStepsAreThoseOfALoneThread)
     touching.add(m, t.state, t.inputs, {}, merging ? 0.6 : 0.0);
     World threads(touching.model, touching.state);
     ThreadWorld lone(3e-4, 0.002);
-    lone.add(m, t.state, t.inputs, std::nullopt);
+    lone.addLone(m, t.state, t.inputs);
     World one(lone.model, lone.state);
     for (int k = 0; k < 100; ++k)
     {
