@@ -206,10 +206,11 @@ void SceneNode::remindOfInputs()
   bool reminded = !waits.empty();
   for (const TfInputs::State& frame : inputs_->frames())
   {
-    if (frame.heard)
+    if (frame.heard && !frame.stale)
       continue;
-    ROS_WARN("%s: tf has no pose yet of the frame %s, which %s follows, and which stays where it is: %s",
-             nh_priv_.getNamespace().c_str(), frame.frame.c_str(), frame.who.c_str(), frame.why.c_str());
+    ROS_WARN("%s: tf has no %s of the frame %s, which %s follows, and which stays where it is: %s",
+             nh_priv_.getNamespace().c_str(), frame.heard ? "new pose" : "pose yet", frame.frame.c_str(),
+             frame.who.c_str(), frame.why.c_str());
     reminded = true;
   }
   if (reminded)

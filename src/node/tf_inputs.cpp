@@ -66,7 +66,8 @@ std::optional<ros::Time> TfInputs::newest(Frame& frame) const
   if (beyond)
     stamp = step;
   const double time = clock_.secondsAt(stamp), age = clock_.seconds() - time;
-  if (age > options_.guide_timeout)
+  frame.stale = age > options_.guide_timeout;
+  if (frame.stale)
   {
     frame.why = "its newest transform is " + seconds(age) + " old (~guide_timeout)";
     return std::nullopt;
@@ -151,7 +152,7 @@ std::vector<TfInputs::State> TfInputs::states() const
     std::string who;
     for (const Follower& follower : frame.followers)
       who += (who.empty() ? "" : ", ") + follower.who;
-    states.push_back({frame.name, who, frame.last.has_value(), frame.why});
+    states.push_back({frame.name, who, frame.last.has_value(), frame.stale, frame.why});
   }
   return states;
 }

@@ -79,7 +79,7 @@ void printLoads(const Simulation& simulation, const RunStatistics& total, const 
   for (const std::string& line : graspLines(total, grasps))
     std::printf("%s\n", line.c_str());
   if (watch.count() > 0)
-    std::printf("limits            exceeded %llu times, %zu still are at the end\n",
+    std::printf("limits            excursions: %llu, still exceeded at the end: %zu\n",
                 static_cast<unsigned long long>(watch.count()), watch.lasting().size());
 }
 

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -184,8 +185,8 @@ private:
   Clock::time_point start_, last_;
 };
 
-/// Checks the limits of the scene and reports excursions on stderr: each excursion once, and at most one per simulated
-/// second.
+/// Checks the limits of the scene and reports excursions on stderr: each excursion once, and of each kind of limit at
+/// most one per simulated second.
 class LimitTeller
 {
 public:
@@ -205,9 +206,10 @@ private:
   {
     for (const slender::LimitExcess& excess : begun)
     {
-      if (told_ && simulation_.state().time < *told_ + 1.0)
-        break;
-      told_ = simulation_.state().time;
+      std::optional<double>& told = told_[static_cast<std::size_t>(excess.kind)];
+      if (told && simulation_.state().time < *told + 1.0)
+        continue;
+      told = simulation_.state().time;
       progress.clear();
       std::fprintf(stderr, "simulate: warning: %s%s\n", excess.text.c_str(),
                    watch_.held().empty() ? "" : "; all driven objects stay in place from now on (on_limit: hold)");
@@ -228,7 +230,7 @@ private:
 
   Simulation& simulation_;
   slender::LimitWatch watch_;
-  std::optional<double> told_;   // [s] simulated time of the last report
+  std::array<std::optional<double>, 4> told_;   // [s] per kind: simulated time of the last report
 };
 
 void saveState(const Simulation& simulation, const std::string& path)

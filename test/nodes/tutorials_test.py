@@ -163,7 +163,7 @@ class Tutorials(unittest.TestCase):
         self.assertEqual(len(places), 801)
         self.assertAlmostEqual(max(places), 0.3, 9)
         self.assertAlmostEqual(places[-1], 0.0, 9)
-        self.done(command("rosrun slender_sim bag_to_video "))
+        self.done(command("rosrun slender_sim bag_to_video table.bag "))
         self.assertGreater(os.path.getsize(self.path("rope.mp4")), 10000)
 
     def test_stiffer_rope(self):
@@ -174,6 +174,41 @@ class Tutorials(unittest.TestCase):
         text = self.listen("/scene", String)
         self.see(text, lambda m: "youngs_modulus: 1e8" in m.data, "the overridden scene")
         self.see(self.listen("/state", RodState), lambda m: m.step > 10, "steps of the stiffer rope")
+
+    def test_film_of_the_cable(self):
+        self.write("cable.yaml", scene("cable"))
+        self.done(command("rosrun slender_sim simulate cable.yaml --bag "))
+        self.done(command("rosrun slender_sim bag_to_video cable.bag "))
+        self.assertGreater(os.path.getsize(self.path("cable.mp4")), 10000)
+
+    def test_cable_moved_by_messages(self):
+        self.write("cable.yaml", scene("cable"))
+        self.assertIn(" record_bag:=$PWD/live.bag", launch_command("cable"))
+        node = self.shell(launch_command("cable"))
+        state = self.listen("/state", RodState)
+        first = self.see(state, lambda m: True, "/state").nodes[-1]
+        self.assertAlmostEqual(first.y, 0.0, 6)   # nobody moves it yet
+        mover = self.shell(command("rostopic pub -r 20 -s /grasps/right/pose"))
+        self.see(state, lambda m: abs(m.nodes[-1].y - 0.2) < 1e-6, "the right end at y = 0.2 m")
+        filtered = self.listen("/grasps/right/wrench_filtered", WrenchStamped)
+        self.see(filtered, lambda m: abs(m.wrench.force.z + 0.72) < 0.05, "half of the cable's weight on the gripper")
+        self.stop(mover)
+        self.stop(node)
+        self.bag_lists("rosbag info live.bag", ["/state", "/scene", "/grasps/right/wrench"])
+
+    def test_cable_moved_by_a_frame(self):
+        self.write("cable.yaml", scene("cable"))
+        self.write("gripper_frame.py", only(r"`gripper_frame\.py`[^\n]*:\n\n```python\n([^`]*)```"))
+        followers = [line for line in commands("roslaunch slender_sim rod.launch") if "{tf: gripper}" in line]
+        self.assertEqual(len(followers), 1)
+        node = self.shell(followers[0])
+        state = self.listen("/state", RodState)
+        self.see(state, lambda m: m.step > 2, "the cable")
+        self.shell(command("/usr/bin/python3 gripper_frame.py"))
+        self.see(state, lambda m: m.nodes[-1].y > 0.15, "the gripper on one side")
+        self.see(state, lambda m: m.nodes[-1].y < -0.15, "the gripper on the other side")
+        self.stop(node)
+        self.bag_lists("rosbag info tf.bag", ["/state", "/scene"])
 
     def test_honey(self):
         self.write("honey.yaml", scene("honey"))

@@ -105,10 +105,12 @@ protected:
       const slender::test::Result result =
           slender::test::shell("cd " + folder_ + " && " + SLENDER_SIMULATE + " " + line);
       ASSERT_EQ(result.status, 0) << line << "\n" << result.output;
+      output_ = result.output;
     }
   }
 
   std::string folder_, text_;
+  std::string output_;   ///< of the last command
 };
 
 TEST_F(Tutorials, theRopeSwingsBelowAGripperThatStandsStill)
@@ -126,6 +128,23 @@ TEST_F(Tutorials, theRopeSwingsBelowAGripperThatStandsStill)
   EXPECT_LT(lowest, 0.25);   // 0.8 m of rope below a gripper at 1 m, stretched a little
   EXPECT_LT(left, -0.1);     // it swings to the other side
   EXPECT_EQ(rowsOf(folder_ + "/out/loads/rod_fields.csv", 0).size(), 41u);
+}
+
+TEST_F(Tutorials, theCableKeepsSlackAndATautOneWarns)
+{
+  follow("cable", 2);
+  const auto held = rowsOf(folder_ + "/out/cable/nodes.csv", 0), next = rowsOf(folder_ + "/out/cable/nodes.csv", 1),
+             moved = rowsOf(folder_ + "/out/cable/nodes.csv", 60), taut = rowsOf(folder_ + "/out/taut/nodes.csv", 60);
+  ASSERT_EQ(moved.size(), 1201u);
+  EXPECT_NEAR(next[0][5], 1.0, 0.003);   // the left end is level, and edges are 20 mm long
+  EXPECT_NEAR(moved.front()[3], 0.9, 1e-9);
+  EXPECT_NEAR(moved.back()[3], 1.0, 1e-9);
+  EXPECT_NEAR(moved.back()[5], 1.2, 1e-9);
+  EXPECT_NEAR(taut.back()[3], 1.25, 1e-9);
+  for (int c = 3; c < 6; ++c)
+    EXPECT_EQ(held.back()[c], held.front()[c]);
+  EXPECT_NE(output_.find("exceeds limits.strain = 0.01"), std::string::npos) << output_;
+  EXPECT_NE(output_.find("largest strain    0.0417\n"), std::string::npos) << output_;
 }
 
 TEST_F(Tutorials, theHoneyCoils)

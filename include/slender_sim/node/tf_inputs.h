@@ -50,6 +50,7 @@ public:
   {
     std::string frame, who;
     bool heard;        ///< a pose came since the start or the last reset
+    bool stale;        ///< the newest pose is older than ~guide_timeout
     std::string why;   ///< reason why there is no newer pose; empty: no problem
   };
   std::vector<State> states() const;
@@ -66,6 +67,7 @@ private:
     std::vector<Follower> followers;
     std::optional<double> last;   // [s] time of the last pose that was passed on
     std::string why;
+    bool stale = false;
     bool checked = false;   // warnOfLoop() was called
   };
 

@@ -213,7 +213,8 @@ void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
     material.at().problem(
         "gives " + joinWords(given) + " but not " + joinWords(missing) + "; give " +
         (missing.size() == 1 ? "this too" : "these too") +
-        ", or youngs_modulus (and poissons_ratio), from which the rest follows with the cross-section");
+        ", or youngs_modulus (and poissons_ratio), from which the rest follows with the cross-section" +
+        (material.has("inextensible") ? ". inextensible does not replace stretch_modulus, which it only raises" : ""));
   }
   if (missing.empty() && at_youngs.present())
     at_youngs.warning("has no effect, since stretch_modulus, bend_modulus and twist_modulus are given; leave it out");
