@@ -220,7 +220,7 @@ StepReport ObjectIsland::step(double duration)
 /// The boxes of its objects from those of their parts.
 void ObjectIsland::trace()
 {
-  if (!contact())
+  if (isDivisible())   // nothing of them can meet anything
     return;
   for (std::size_t k = 0, member = 0; k < objects_.size(); ++k)
   {

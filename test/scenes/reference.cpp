@@ -43,7 +43,7 @@ TEST(SceneReference, NamesRangesAndUnits)
   EXPECT_EQ(keyOf(all, "time.step").what, "a number in (0, 10] s");
   EXPECT_EQ(keyOf(all, "rods.N.grasps.NAME.hold").what, "one of: frame, position");
   EXPECT_EQ(keyOf(all, "cloths.N.plasticity.yield_curvature").what, "a number in [0, 1000000000] 1/m");
-  EXPECT_EQ(keyOf(all, "bodies.N.welds.N.edge").what, "a place, counted from 0, or from the end by negative numbers");
+  EXPECT_EQ(keyOf(all, "bodies.N.welds.N.edge").what, "an index from 0 or, if it is negative, from the end");
   EXPECT_EQ(keyOf(all, "record.fields").what.substr(0, 38), "a list, each entry one of: curvature, ");
 }
 
