@@ -101,6 +101,8 @@ public:
 private:
   // the system of a stage, as these two need it
   template <class System>
+  friend bool isLastIncrement(System&, const NewtonConfig&, const HessianShift&, double);
+  template <class System>
   friend NewtonResult minimize(System&, const NewtonConfig&);
   template <class System>
   friend NewtonResult minimizeConfined(System&, double, double, const NewtonConfig&, double);

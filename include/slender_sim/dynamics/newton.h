@@ -25,6 +25,21 @@ struct NewtonResult
 /// curvature 2 tan(phi/2) has grown to 40 and parallel transport is about to become undefined.
 constexpr double kFoldedChi = 1.5e-3;
 
+/// Returns whether a full step of this increment ends Newton's method. A shifted Hessian shortens the increment, so a
+/// saddle (a step's equation may well have one) must show by its residual.
+template <class System>
+bool isLastIncrement(System& system, const NewtonConfig& config, const HessianShift& shift, double increment)
+{
+  if (increment <= config.tolerance && shift.none())
+    return true;
+  if (increment >= 1e-2)
+    return false;
+  const double residual = system.residual();
+  return residual <= system.noiseLevel() || (increment <= config.tolerance && residual < 1e-9 * system.forceScale()) ||
+         // shifts of angles shorten it no more than tenfold
+         (shift.position == 0.0 && increment <= 1e-3 * config.tolerance && system.anglesMayKeepShift());
+}
+
 /// Minimises a system's energy by Newton's method from its trial configuration.
 ///
 /// System offers evaluate(with_hessian, shift), solve(), moveAlong(alpha), accept(), saveBase(), restoreBase() and
@@ -59,16 +74,15 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
 
   for (;;)
   {
-    if (stepsInterrupted())
-      return fail(StepFailure::interrupted);
-    if (const StepFailure why = system.givesUp(); why != StepFailure::none)
+    const StepFailure why = stepsInterrupted() ? StepFailure::interrupted : system.givesUp();
+    if (why != StepFailure::none)
       return fail(why);
     // round-off of the energy's sum; differences below it mean nothing
     const double noise = 1e-13 * (std::abs(trial.stretch) + std::abs(trial.bend_twist) + std::abs(trial.potential));
     while (!trial.inertia.positiveDefinite())
     {
-      if (const StepFailure why = system.givesUp(); why != StepFailure::none)
-        return fail(why);
+      if (const StepFailure hopeless = system.givesUp(); hopeless != StepFailure::none)
+        return fail(hopeless);
       shift.raise();
       if (shift.position > kMaxShift)
         return fail(StepFailure::singular_matrix);
@@ -92,18 +106,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (!std::isfinite(increment))
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
-    // A shifted Hessian shortens the increment, so a saddle (a step's equation may well have one) must show by its
-    // residual.
-    bool converged = alpha == 1.0 && increment <= config.tolerance && shift.none();
-    if (!converged && alpha == 1.0 && increment < 1e-2)
-    {
-      const double residual = system.residual();
-      converged = residual <= system.noiseLevel() ||
-                  (increment <= config.tolerance && residual < 1e-9 * system.forceScale()) ||
-                  // they shorten it no more than tenfold
-                  (shift.position == 0.0 && increment <= 1e-3 * config.tolerance && system.anglesMayKeepShift());
-    }
-    if (converged)
+    if (alpha == 1.0 && isLastIncrement(system, config, shift, increment))
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
