@@ -5,6 +5,7 @@ import math
 import rosbag
 import rospy
 from geometry_msgs.msg import PoseStamped, TransformStamped
+from rosgraph_msgs.msg import Log
 from slender_sim.msg import BodyStates, ClothState, GraspStates, RodState, ThreadState
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
@@ -230,9 +231,10 @@ threads:
     def test_a_frame_behind_an_own_frame(self):
         """The tool hangs on the grasp that follows it."""
         self.follow(guide_delay=0.05)
+        log = self.listen("/rosout", Log)   # notes in a file of output come late
         self.stand("tool0", (0, 0, 0.1), parent="t/rod/grasps/right")
         self.heard("tool0")
-        wait_until(lambda: "the frame tool0 of tf has come" in self.output("rod.out") + self.output("rod.err"),
+        wait_until(lambda: any("the frame tool0 of tf has come" in message.msg for message in log.all()),
                    what="the note")
         wait_until(lambda: "a descendant of t/rod/grasps/right, which this node broadcasts" in
                    self.output("rod.out") + self.output("rod.err"), what="the warning")
