@@ -91,12 +91,13 @@ StepFailure ClothPart::finishSubstep(StepReport&)
                                                                                           : StepFailure::none;
 }
 
-/// The semidefinite Hessian is positive definite with inertia, so that no shift mends what its solver cannot solve.
+/// The semidefinite Hessian is positive definite with inertia. What its solver cannot solve, a cloth alone solves in a
+/// shorter step, which has more inertia. In islands of several parts shifts come first.
 StepFailure ClothPart::givesUp() const
 {
   if (stages_.workExceeded())
     return StepFailure::work_exceeded;
-  if (exact_ || coupled || outcome_ == LinearOutcome::solved)
+  if (own_ || exact_ || coupled || outcome_ == LinearOutcome::solved)
     return StepFailure::none;
   return outcome_ == LinearOutcome::not_converged ? StepFailure::linear_unconverged : StepFailure::singular_matrix;
 }
@@ -192,10 +193,10 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   evaluation.bend_twist = e.bending;
   evaluation.potential = e.potential;
   evaluation.max_strain = e.max_strain;
-  if (coupled)
-    return;
   if (!with_hessian)
     largest_internal_ = stages_.closeGradient();
+  if (coupled)
+    return;
   addOwnContacts(with_hessian);
   if (with_hessian && std::isfinite(evaluation.energy()))
     factor(shift);
@@ -416,7 +417,9 @@ double ClothPart::residual() const
 double ClothPart::forceScale() const
 {
   const ClothModel& m = *stages_.model;
-  double largest = std::max(stages_.resolvedForce(), stages_.largestInternal());
+  // alone: with IslandTolerances::most_unbalanced a tenth of this may be unbalanced
+  const double resolved = own_ ? stages_.resolvedForce() : 10.0 * stages_.resolvedForce();
+  double largest = std::max(resolved, stages_.largestInternal());
   largest = std::max(largest, m.mass.maxCoeff() * stages_.inputs().gravity.norm());
   for (const int p : stages_.present().pins)
     largest = std::max(largest, vertex(system().gradient(), p).norm());

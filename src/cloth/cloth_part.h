@@ -55,7 +55,8 @@ public:
   Largest unbalancedForce() const override;
   void refuse(StepFailure failure, double length, StepReport& report) const override
   {
-    stages_.refuseUnsolved(report, failure, length);
+    report.linear_iterations += counts_.linear_iterations;
+    stages_.refuseUnsolved(report, stages_.workExceeded() ? StepFailure::work_exceeded : failure, length);
   }
 
   bool shorterMayHelp(StepFailure) const override { return !stages_.workExceeded(); }

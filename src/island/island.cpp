@@ -192,7 +192,9 @@ StepFailure Island::solveSubstep(const Substep& substep, StepReport& report)
     report.factorizations += newton.factorizations;
     if (!newton.ok())
     {
-      failed_ = farthestFromBalance();
+      const auto hopeless = std::find_if(parts_.begin(), parts_.end(),
+                                         [&](const Part* part) { return part->givesUp() == newton.failure; });
+      failed_ = hopeless == parts_.end() ? farthestFromBalance() : static_cast<std::size_t>(hopeless - parts_.begin());
       return newton.failure;
     }
     report.residual = std::max(report.residual, newton.residual);

@@ -43,7 +43,12 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   need(world.time.integrator != Integrator::symplectic_euler || !simulates,
        "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler "
        "(time.integrator)");
-  need(!touching_threads || !simulates || world.time.integrator == Integrator::implicit_euler,
+  const bool may_join = !content.cloths.empty() || std::any_of(content.rods.begin(), content.rods.end(), [&](int r) {
+    return world.rods[r].contact.has_value();
+  }) || std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) {
+    return world.bodies[b].shape.has_value();
+  });
+  need(!touching_threads || !simulates || !may_join || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
   return content;

@@ -39,9 +39,16 @@ bool meetsSolids(const WorldModel& world, int body)
 
 bool touches(const WorldModel::Rod& rod) { return rod.contact.has_value(); }
 
+/// Null: the rod tracks nothing.
 std::shared_ptr<const WeakConstraints> constraintsOf(const WorldModel::Rod& rod)
 {
-  return rod.tracked.sets ? rod.tracked.sets->front().constraints : nullptr;
+  if (!rod.tracked.sets)
+    return nullptr;
+  const auto& constraints = rod.tracked.sets->front().constraints;
+  if (!constraints || constraints->count() == 0 || constraints->matrix().cols() != rod.model->nodes())
+    throw std::invalid_argument("rod '" + rod.model->name + "': averages of its " + std::to_string(rod.model->nodes()) +
+                                " nodes expected, at least one");
+  return constraints;
 }
 
 /// Throws std::invalid_argument if a rod cannot track its guide in these steps.

@@ -114,6 +114,25 @@ TEST(IslandScheduler, WhatIsFarApartMovesAsOnItsOwn)
   EXPECT_NEAR(together.state().bodies[0].X_WB.position.z(), -0.3 * 0.05 - 9.81 * 0.05 * 0.051 / 2, 1e-12);
 }
 
+/// A rod without contact and a body without a shape, welded together, keep their integrator beside a thread that
+/// touches.
+TEST(IslandScheduler, ThreadsLeaveTheIntegratorToWhatTheyCannotMeet)
+{
+  std::string rod = kRod;
+  rod.erase(rod.find("    contact: {friction: 0.3}\n"));
+  const std::string hanging = std::string(kThread) + rod +
+                              "bodies: [{name: bob, mass: 0.001, inertia: [1.0e-8, 1.0e-8, 1.0e-8], "
+                              "pose: {position: [0.02, 0, 0]}, welds: [{rod: cable, edge: -1}]}]\n";
+  EXPECT_EQ(parseScene(hanging).time.integrator, Integrator::tr_bdf2);
+  Simulation s(parseScene(hanging));
+  EXPECT_TRUE(s.step(s.defaultInputs()).ok);
+  const std::string ball =
+      "bodies.0={name: bob, mass: 0.001, shape: {sphere: {radius: 0.004}}, pose: {position: "
+      "[0.02, 0, 0]}, welds: [{rod: cable, edge: -1}]}";
+  EXPECT_EQ(parseScene(hanging, "ball", {ball}).time.integrator, Integrator::implicit_euler);
+  EXPECT_ANY_THROW(Simulation(parseScene(hanging, "ball", {ball, "time.integrator=bdf2"})));
+}
+
 /// The ball stands still 2 mm above the rod. Its force moves it by 11 mm in one step, which its velocity does not tell.
 TEST(IslandScheduler, IslandsThatMeetUnexpectedlyMakeTheirStepAgain)
 {

@@ -100,18 +100,17 @@ bool hitsSomething(const SceneConfig& scene, const BodyConfig& body)
 {
   return !body.motion && body.shape && body.contact &&
          (!scene.obstacles.empty() ||
+          std::any_of(scene.threads.begin(), scene.threads.end(),
+                      [](const ThreadConfig& thread) { return thread.contact.has_value(); }) ||
           std::any_of(scene.bodies.begin(), scene.bodies.end(),
                       [&](const BodyConfig& other) { return &other != &body && other.shape && other.contact; }));
 }
 
-/// The integrator of rods and bodies that touch something, or that a thread may touch.
+/// The integrator of rods and bodies that touch something.
 void checkContactTime(const YamlCursor& time, SceneConfig& scene)
 {
   const auto hits = [&](const BodyConfig& body) { return hitsSomething(scene, body); };
-  const bool flows = !(scene.rods.empty() && scene.bodies.empty()) &&
-                     std::any_of(scene.threads.begin(), scene.threads.end(),
-                                 [](const ThreadConfig& t) { return t.contact.has_value(); });
-  const bool touches = flows || std::any_of(scene.rods.begin(), scene.rods.end(), touchesSomething) ||
+  const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), touchesSomething) ||
                        std::any_of(scene.bodies.begin(), scene.bodies.end(), hits);
   if (touches && !YamlMap(time).has("integrator"))
   {
