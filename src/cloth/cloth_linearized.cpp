@@ -1,4 +1,4 @@
-// Newton's equations of a stage: their solution, one linearised step, and what averages balance.
+// Solves Newton's equations of a stage, and checks the energy of linearised steps.
 #include "cloth_stages.h"
 
 namespace slender {
@@ -25,7 +25,7 @@ void ClothStages::placeLinearized(PointVector& motion)
   }
 }
 
-/// Strains are those that viscosity counts from.
+/// The strains at this point are those from which viscous forces are counted.
 void ClothStages::takeStartEnergy(double energy)
 {
   if (order(options.integrator) == 2)
@@ -48,7 +48,7 @@ double ClothStages::closeGradient()
   return internal;
 }
 
-/// Of forces that change from the start of a step to x [J].
+/// Work [J] of forces on the free vertices, from the start of a step to x.
 double ClothStages::workOnFree(const PointVector& forces) const
 {
   double work = 0.0;

@@ -244,7 +244,7 @@ void ClothPart::addOwnContacts(bool with_hessian)
 }
 
 /// Conjugate gradients find out only while they solve whether a matrix is definite, so that they solve here. A
-/// linearised step moves what is held, which factors alone do not.
+/// linearised step is solved here as well, because its solution depends on the motion of held vertices.
 void ClothPart::factor(const HessianShift& shift)
 {
   const double added = inertiaShift(shift);

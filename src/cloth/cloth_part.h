@@ -23,8 +23,9 @@ public:
   /// Throws std::invalid_argument for other integrators than implicit_euler, for prescribed averages, and for a model
   /// or options that are not valid. The island minimises wholly, whether the options ask for one Newton step or not.
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
-  /// A cloth alone in its island, with all integrators and with averages. `one_newton_step` of the options holds. The
-  /// stages must outlive the part; others begin and end their steps, and start their budget.
+  /// A cloth that is alone in its island. It takes all implicit integrators of cloth, prescribed averages, and
+  /// `one_newton_step` of the options. The stages must outlive the part. The owner of the stages starts the budget of
+  /// work of each step.
   explicit ClothPart(ClothStages& stages);
 
   /// State, inputs, forces on pins, and messages.
@@ -113,7 +114,7 @@ private:
   void allocate();
   bool solvesByFactors() const { return stages_.linear->kind() == ClothSolver::cholesky && !linearized_; }
 
-  std::unique_ptr<ClothStages> own_;   ///< null: those of others
+  std::unique_ptr<ClothStages> own_;   ///< null: the stages belong to another object
   ClothStages& stages_;                ///< whose x is the trial
   bool linearized_ = false;            ///< steps are one step of Newton's method
   std::optional<ContactProperties> contact_;

@@ -50,12 +50,14 @@ public:
   /// Prepares one step of Newton's method. x := where the step is linearised; held vertices are not moved yet.
   /// motion := from there to the end of the stage as placeGuess() has it.
   void placeLinearized(PointVector& motion);
-  /// Solves the Newton equations of the last evaluation with a Hessian. `d` holds a first guess, and what held vertices
-  /// move by. `linearized`: for a step that placeLinearized() began, which ends at the prescribed averages.
+  /// Solves the Newton equations of the last evaluation with a Hessian. Before the call, `d` holds a first guess for
+  /// free vertices and the given motion of held vertices. `linearized` is true if placeLinearized() began the stage.
+  /// The solution then ends at the prescribed averages; otherwise it leaves the averages as they are.
   LinearOutcome solveNewton(PointVector& d, bool linearized, StepReport& counts);
-  /// Moves the free vertices of x so that the prescribed averages of the substep are met to rounding.
+  /// Moves the free vertices of x so that x has the prescribed averages of the substep, up to rounding. Without
+  /// averages it does nothing.
   void meetAverages();
-  /// Of an evaluation at the start of a linearised stage: elastic and viscous energy there [J].
+  /// Keeps the elastic and viscous energy [J] of an evaluation at the start of a linearised stage, for createsEnergy().
   void takeStartEnergy(double energy);
   /// Completes an evaluation at x without contact: counts the work of pins and averages, and takes the part out of the
   /// gradient that the averages balance. Returns the largest elastic and viscous force on a vertex [N].
@@ -128,7 +130,7 @@ protected:
   /// stage count that of the end in the same way; steps of two, whose stages have viscous forces of their own, without
   /// these.
   double energy_start_ = 0, elastic_start_ = 0;
-  /// Of averages and of pins from the start of a step to its end [J].
+  /// Work of the averages and of the pins from the start of a step to its end [J].
   double average_work_ = 0, pin_work_ = 0;
 
 private:

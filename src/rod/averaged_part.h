@@ -10,13 +10,14 @@
 
 namespace slender {
 
-/// A rod under constraints C x = targets. Directions go along them, by a Schur complement of the rod's matrix.
+/// A rod under the constraints C x = targets. A Schur complement of the rod's matrix makes Newton's directions satisfy
+/// the constraints.
 class AveragedPart : public RodPart
 {
 public:
   using Averages = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-  /// c: count x nodes, rows sum to 1. It must outlive the part.
+  /// c: the matrix C, count x nodes. Its rows sum to 1. It must outlive the part.
   AveragedPart(RodStepper::Impl& rod, const Averages& c)
     : RodPart(rod, false),
       c_(c),

@@ -64,7 +64,7 @@ public:
 
   /// Null: it may meet others, or tracks a guide.
   RodStepper* alone() { return meets || averages_ ? nullptr : whole.get(); }
-  /// Of a rod that tracks a guide, after a step: writes the guide and its forces into the state.
+  /// Writes the guide and its forces into the state after a step, if the rod tracks a guide.
   void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const;
 
   const std::unique_ptr<RodStepper> whole;

@@ -111,8 +111,8 @@ ClothState makeClothState(const ClothModel& model, const Eigen::Matrix3Xd& verti
 double largestRestAngle(const ClothModel& model);
 
 /// Whether isometric bending keeps the rest shape: its constant matrix acts on positions and flattens all that is
-/// curved. A shape counts as flat if no vertex is farther from a plane than two millionths of its size, which is
-/// the precision of files with six digits, and if it is not folded onto itself.
+/// curved. A shape counts as flat if no vertex is farther from a plane than two millionths of the shape's size, and if
+/// the shape is not folded onto itself. Files with six digits have this precision.
 bool restsFlat(const ClothModel& model);
 
 /// Throws std::invalid_argument with the fix where the bending model does not suit the cloth: isometric bending of a

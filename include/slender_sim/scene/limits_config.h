@@ -16,16 +16,16 @@ enum class OnLimit
 
 /// Default limits of strain [-]. The laws of stretching are linear and neglect the change of the cross-section. At a
 /// strain of 0.5 this change is a third to a half, and only rubber withstands such a strain. Metals and stiff polymers
-/// (a modulus of at least kStiffModulus [Pa]) yield or break below 0.05. A rod that the scene calls inextensible is
-/// pulled by a gripper if its strain is above 0.01.
+/// (a modulus of at least kStiffModulus [Pa]) yield or break below 0.05. An inextensible rod reaches a strain of 0.01
+/// only if a gripper pulls it beyond its length.
 constexpr double kSoftStrain = 0.5, kStiffStrain = 0.05, kInextensibleStrain = 0.01;
 constexpr double kStiffModulus = 1e9;
 
 /// Limits of a run. Infinity means no limit.
 struct LimitsConfig
 {
-  /// Largest stretch strain of the edges of rods and of the mesh edges of cloths [-]. Nothing: the default of its
-  /// material for a rod, kSoftStrain for a cloth.
+  /// Largest stretch strain of the edges of rods and of the mesh edges of cloths [-]. Without a value,
+  /// a rod has the default of its material, and a cloth has kSoftStrain.
   std::optional<double> strain;
   /// Largest force [N] and torque [N m] on a grasp. A useful limit depends on the gripper.
   double force = std::numeric_limits<double>::infinity(), torque = std::numeric_limits<double>::infinity();

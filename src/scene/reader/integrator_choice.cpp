@@ -1,4 +1,4 @@
-// The integrator of a scene: its default, and what objects do not have.
+// Chooses the integrator of a scene, and reports options of time that its objects do not support.
 #include <algorithm>
 #include <string>
 
@@ -48,8 +48,8 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   }
 }
 
-/// Threads take implicit Euler steps of fixed length, and nothing blows on them. Alone they refuse what they do not
-/// have; beside other objects, which may have it, that is a warning.
+/// Threads take implicit Euler steps of fixed length, and wind does not act on them. A scene of threads alone is
+/// refused if it asks for something else. Beside other objects this is a warning, because it may be meant for them.
 void checkThreadTime(YamlMap& map, const SceneConfig& scene)
 {
   YamlMap time(map.find("time"));

@@ -121,8 +121,8 @@ std::vector<std::pair<ObstacleConfig, YamlCursor>> readRobots(const YamlCursor& 
 bool takeRobotParameters(YamlTree& scene, const std::string& directory);
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
 TimeConfig readTime(const YamlCursor& at);
-/// Chooses the integrator of a scene that names none, and reports what its objects do not have. Comes when all objects
-/// are read. `time`: the key of the scene.
+/// Chooses the integrator if the scene names none. Reports integrators and options that the objects of the scene do not
+/// support. Call it when all objects are read. `time` is the value of the key `time`.
 void chooseIntegrator(YamlMap& map, const YamlCursor& time, SceneConfig& scene);
 RecordConfig readRecord(const YamlCursor& at);
 StartConfig readStart(const YamlCursor& at);
