@@ -41,7 +41,7 @@ const char kUsage[] =
     "  --json   metrics and rows of all studies run\n"
     "  --out    a CSV table and PNG plots of each study (the directory is made); report: DIR/report.html, one page "
     "with all of them, and DIR/results.md.\n"
-    "           Stopped, it goes on where it was;\n"
+    "           Results that are in DIR already are kept, also those of an earlier version;\n"
     "           with names: of these studies alone\n"
     "  results  writes DIR/results.md again from the results that a report left in DIR, and runs nothing\n"
     "  --jobs   studies at a time (default 1; times are of CPUs, but more of them disturb each other a little)\n"

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <stdexcept>
 #include <vector>
 
@@ -124,11 +125,13 @@ std::string localTime()
   return text;
 }
 
-/// What results must not be mixed with: another program or extent.
-std::string extent(bool quick)
+/// Results of the two extents must not be mixed.
+std::string extent(bool quick) { return std::string(quick ? "quick" : "full") + " report\n"; }
+
+std::string thisVersion()
 {
-  return std::string(quick ? "quick" : "full") + " report by " + thisProgram() + " of " +
-         std::to_string(fs::last_write_time(thisProgram()).time_since_epoch().count()) + "\n";
+  const std::string commit = SLENDER_COMMIT;
+  return SLENDER_VERSION + (commit.empty() ? "" : ", commit " + commit);
 }
 
 using Facts = std::vector<std::pair<std::string, std::string>>;
@@ -138,8 +141,7 @@ Facts facts(bool quick)
 {
   utsname system{};
   uname(&system);
-  const std::string commit = SLENDER_COMMIT;
-  return {{"version", SLENDER_VERSION + (commit.empty() ? "" : ", commit " + commit)},
+  return {{"version", thisVersion()},
           {"made", localTime()},
           {"extent", quick ? "quick: fewer and coarser cases" : "full"},
           {"processor", systemValue("/proc/cpuinfo", "model name")},
@@ -160,14 +162,45 @@ void prepare(const ReportOptions& options)
     throw BadInput("cannot make directory " + options.out + "/data: " + error.message());
   const std::string file = options.out + "/data/extent.txt", wanted = extent(options.quick);
   if (fs::exists(file) && wholeFile(file) != wanted)
-    throw BadInput(options.out + " holds the results of another program or extent (" + file +
-                   "); give another --out or delete it");
-  if (fs::exists(file))
-    return;
+    throw BadInput(options.out + " holds a report of another extent (" + file + "); give another --out or delete it");
   std::ofstream(file) << wanted;
   std::ofstream kept(factsFile(options.out));
   for (const auto& [key, text] : facts(options.quick))
     kept << key << ": " << text << "\n";
+}
+
+std::string versionFile(const ReportedStudy& s) { return s.folder + "/version.txt"; }
+
+/// The versions that made the results of `sections`, the most frequent one first. All others list their studies.
+std::string versionsOf(const std::vector<ReportSection>& sections)
+{
+  std::map<std::string, std::vector<std::string>> studies;
+  for (const ReportSection& section : sections)
+    for (const ReportedStudy& s : section.studies)
+      if (fs::exists(versionFile(s)))
+        studies[wholeFile(versionFile(s))].push_back(s.name);
+  std::vector<std::pair<std::string, std::vector<std::string>>> sorted(studies.begin(), studies.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const auto& a, const auto& b) { return a.second.size() > b.second.size(); });
+  std::string text;
+  for (const auto& [version, names] : sorted)
+  {
+    text += (text.empty() ? "" : "; ") + version;
+    if (&version == &sorted.front().first)
+      continue;
+    for (const std::string& name : names)
+      text += (&name == &names.front() ? ": " : ", ") + name;
+  }
+  return text;
+}
+
+/// Replaces the version of the program that runs by those of the results, if the results tell theirs.
+void tellVersions(Facts& facts, const std::vector<ReportSection>& sections)
+{
+  const std::string versions = versionsOf(sections);
+  for (auto& [key, text] : facts)
+    if (key == "version" && !versions.empty())
+      text = versions;
 }
 
 /// Returns what prepare() kept. A report of a version that did not keep it has none.
@@ -247,7 +280,10 @@ void writeResults(const std::string& directory)
   ReportOptions all;
   all.out = directory;
   const bool quick = wholeFile(extent_file).rfind("quick", 0) == 0;
-  writePage(directory + "/results.md", resultsPage(keptFacts(directory), quick, sectionsOf(all)));
+  const std::vector<ReportSection> sections = sectionsOf(all);
+  Facts kept = keptFacts(directory);
+  tellVersions(kept, sections);
+  writePage(directory + "/results.md", resultsPage(kept, quick, sections));
 }
 
 int makeReport(const ReportOptions& options)
@@ -278,6 +314,7 @@ int makeReport(const ReportOptions& options)
                    if (!fs::exists(todo[k]->folder + "/result.json"))
                      todo[k]->failure = why;
                  }
+                 std::ofstream(versionFile(*todo[k])) << thisVersion();
                  progress.show(++done);
                });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -285,6 +322,7 @@ int makeReport(const ReportOptions& options)
   std::snprintf(took, sizeof took, "%.0f s for %zu studies, %ld at a time", seconds, todo.size(), options.jobs);
   Facts of_page = facts(options.quick);
   of_page.emplace_back("this call", took);
+  tellVersions(of_page, sections);
   const std::string page = options.out + "/report.html";
   writePage(page, reportPage("slender_sim: error against run time, stability, cost", of_page, sections));
   writeResults(options.out);

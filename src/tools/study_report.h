@@ -14,9 +14,10 @@ struct ReportOptions
 };
 
 /// Runs the studies of the report, each as a process of its own (`study run NAME --json ... --out OUT/data/NAME`),
-/// those that OUT holds already left out, and writes OUT/report.html, which needs no other file, and OUT/results.md.
-/// Progress on stderr. Returns the number of studies that failed; the page names them. Throws BadInput when OUT holds
-/// results of another program or extent, or cannot be written, and for names that the report has not.
+/// and writes OUT/report.html, which needs no other file, and OUT/results.md. A study whose result is in OUT already
+/// does not run again, also if an earlier version of the package made the result; the pages name the version of each
+/// result. Progress on stderr. Returns the number of studies that failed; the page names them. Throws BadInput when OUT
+/// holds a report of the other extent, or cannot be written, and for names that the report has not.
 int makeReport(const ReportOptions& options);
 
 /// Writes DIR/results.md (see results_page.h) from the results that an earlier report left in DIR/data. Runs nothing.

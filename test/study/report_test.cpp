@@ -136,12 +136,21 @@ TEST_F(Report, tellsWhichStudiesFailedAndWhy)
       << "the bar of trouton's errors";
 }
 
+TEST_F(Report, namesTheVersionOfEachResult)
+{
+  ASSERT_EQ(report("trouton elastica").status, 0);
+  std::ofstream(folder_ + "/out/data/trouton/version.txt") << "0.0.1, commit old";
+  ASSERT_EQ(report("trouton elastica torsion").status, 0);
+  for (const std::string& page : {page(), contents(folder_ + "/out/results.md")})
+    EXPECT_NE(page.find("; 0.0.1, commit old: trouton"), std::string::npos) << page.substr(0, 3000);
+}
+
 TEST_F(Report, mixesNothingAndKnowsItsStudies)
 {
   ASSERT_EQ(report("trouton").status, 0);
   const Result full = slender::test::shell(SLENDER_STUDY " report trouton --out " + folder_ + "/out");
   EXPECT_EQ(full.status, 2);
-  EXPECT_NE(full.output.find("holds the results of another program or extent"), std::string::npos) << full.output;
+  EXPECT_NE(full.output.find("holds a report of another extent"), std::string::npos) << full.output;
   const Result unknown = report("trouton elastika");
   EXPECT_EQ(unknown.status, 2);
   EXPECT_NE(unknown.output.find("elastika"), std::string::npos) << unknown.output;
