@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/geometry/rotation.h"
-#include "contact/impact_zones.h"
+#include "contact/impulses/impact_zones.h"
 #include "test/support/random.h"
 #include "test/support/sheets.h"
 

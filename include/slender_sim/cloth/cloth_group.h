@@ -8,7 +8,7 @@
 
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/contact/contact_potential.h"
-#include "slender_sim/contact/surface_collider.h"
+#include "slender_sim/contact/impulses/surface_collider.h"
 #include "slender_sim/dynamics/substep_controller.h"
 
 namespace slender {

@@ -1,4 +1,4 @@
-#include "slender_sim/contact/surface_collider.h"
+#include "slender_sim/contact/impulses/surface_collider.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "collision_elements.h"
-#include "kdop_tree.h"
+#include "contact/kdop_tree.h"
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/dynamics/work_budget.h"
 

@@ -6,7 +6,7 @@
 #include "collision_pairs.h"
 #include "collision_rows.h"
 #include "impact_zones.h"
-#include "slender_sim/contact/surface_collider.h"
+#include "slender_sim/contact/impulses/surface_collider.h"
 
 namespace slender {
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "slender_sim/contact/surface_collider.h"
+#include "slender_sim/contact/impulses/surface_collider.h"
 
 namespace slender {
 
