@@ -77,6 +77,17 @@ void GraspWrenches::publish(const ros::Publisher& publisher, const Channel& chan
   publisher.publish(message);
 }
 
+void GraspWrenches::takeOver(const GraspWrenches& before)
+{
+  for (Channel& channel : channels_)
+    for (const Channel& earlier : before.channels_)
+      if (earlier.filtered.getTopic() == channel.filtered.getTopic())
+      {
+        channel.last = earlier.last;
+        channel.started = earlier.started;
+      }
+}
+
 void GraspWrenches::restart()
 {
   for (Channel& channel : channels_)

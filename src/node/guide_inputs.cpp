@@ -516,32 +516,4 @@ void GuideInputs::skip(double seconds)
   tracking_->skip(seconds);
 }
 
-std::vector<std::string> GuideInputs::unheardBodies() const
-{
-  std::vector<std::string> bodies;
-  for (std::size_t g = 0; g < guided_.size(); ++g)
-    if (guided_[g].buffer && !guided_[g].body.empty() && !guided_[g].buffer->lastTime())
-      bodies.push_back(guided_[g].body + (g < grasps_ ? " for grasp " + guided_[g].name : ""));
-  return bodies;
-}
-
-std::vector<GuideInputs::Age> GuideInputs::ages() const
-{
-  std::vector<Age> ages;
-  for (const Guided& guided : guided_)
-  {
-    if (!guided.buffer)
-      continue;
-    std::optional<double> age = guided.buffer->lastTime();
-    if (age)
-      age = clock_.seconds() - *age;
-    const std::string name = guided.name + (guided.frame.empty() ? "" : " (tf " + guided.frame + ")");
-    ages.push_back({name, age, false, guided.buffer->timing().lag(), guided.buffer->timing().excess(),
-                    guided.buffer->timing().interval()});
-  }
-  for (const Age& age : tracking_->ages())
-    ages.push_back(age);
-  return ages;
-}
-
 }   // namespace slender

@@ -2,6 +2,7 @@
 
 #include "marker_tools.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/node/scene_markers.h"
 
 namespace slender {
 namespace {
@@ -38,6 +39,12 @@ Eigen::AlignedBox3d sceneBox(const SceneState& state)
   return box;
 }
 
+double legendLetters(const SceneState& state)
+{
+  const Eigen::AlignedBox3d box = sceneBox(state);
+  return box.isEmpty() ? 0.0 : 0.04 * box.diagonal().norm();
+}
+
 void addLegend(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
                visualization_msgs::MarkerArray& out)
 {
@@ -69,11 +76,11 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
     out.markers.push_back(std::move(marker));
     return;
   }
-  const double size = box.diagonal().norm();
+  const double letters = options.letters > 0.0 ? options.letters : legendLetters(simulation.state());
   Eigen::Vector3d place = box.center();
-  place.z() = box.max().z() + 0.1 * size;
+  place.z() = box.max().z() + 2.5 * letters;
   marker.pose.position = toPoint(place);
-  marker.scale.z = 0.04 * size;   // height of a letter
+  marker.scale.z = letters;
   marker.color = color(0.15, 0.15, 0.18);
   marker.text = text.substr(0, text.size() - 1);
   out.markers.push_back(std::move(marker));

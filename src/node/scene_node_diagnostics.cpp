@@ -204,6 +204,16 @@ void SceneNode::remindOfInputs()
              stranger.empty() ? "" : ". Messages there name others: ", stranger.c_str());
   }
   bool reminded = !waits.empty();
+  if (!told_of_topics_ && total_.steps > 0 && total_.simulated > kClockReminder / 2)
+  {
+    told_of_topics_ = true;
+    std::string topics;
+    for (const std::string& topic : inputs_->unheardTopics())
+      topics += (topics.empty() ? "" : ", ") + topic;
+    if (!topics.empty())
+      ROS_INFO("%s: nobody has published a pose yet for %s; what follows it stays where it is",
+               nh_priv_.getNamespace().c_str(), topics.c_str());
+  }
   for (const TfInputs::State& frame : inputs_->frames())
   {
     if (frame.heard && !frame.stale)

@@ -129,6 +129,7 @@ void SceneNode::takeUp(EditedScene edited)
     const std::vector<ros::Publisher> before = takePublishers();
     advertise();
   }
+  wrenches_->takeOver(*wrenches_before);
   std_msgs::String scene;
   scene.data = simulation_->config().source;
   scene_pub_.publish(scene);

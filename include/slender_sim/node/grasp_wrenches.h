@@ -30,6 +30,8 @@ public:
   bool isHeard() const;
   /// Publishes the wrenches of one instant, from the wrenches and poses of the grasps in `messages`.
   void publish(const SceneMessages& messages);
+  /// Continues the filters of `before` on topics of the same name. Call it after an edit of the scene.
+  void takeOver(const GraspWrenches& before);
   /// Restarts the filter with the next wrench. Call it after the state was replaced.
   void restart();
 
