@@ -1,5 +1,7 @@
 #include "chain_part.h"
 
+#include <algorithm>
+
 namespace slender {
 
 void ChainPart::numberFree()
@@ -39,8 +41,12 @@ void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], co
 /// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the band.
 void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  const bool alone = !coupled && own_terms.empty();
+  const bool alone = !coupled && own_terms.empty() && !averages_;
   evaluation = alone ? system_.evaluate(with_hessian, shift) : system_.evaluateWhole(with_hessian);
+  if (averages_)
+    averages_->forEntries([&](Eigen::Index i, int node, double weight) {
+      Eigen::Map<Eigen::Vector3d>(system_.gradient() + 4 * node) -= weight * averages_->forces.col(i);
+    });
   if (alone || coupled)
     return;
   for (const ContactTerm* term : own_terms)
@@ -58,6 +64,42 @@ void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
   for (const ContactRow* row : own_rows)
     addToPanels(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
   evaluation.inertia = system_.factorWhole(shift);
+}
+
+void ChainPart::solve()
+{
+  system_.solve();
+  if (!averages_)
+    return;
+  schur_.begin(3 * averages_->count(), 4 * system_.nodes());
+  averages_->forEntries([&](Eigen::Index i, int node, double weight) {
+    for (int k = 0; k < 3 && system_.isFree(node); ++k)
+      schur_.add(3 * i + k, 4 * node + k, weight);
+  });
+  schur_.correct(system_.direction(), [this](double* x) { system_.solveFor(x); });
+  averages_->addMultipliers(schur_.change().data());
+}
+
+void ChainPart::meetAverages()
+{
+  if (!averages_)
+    return;
+  averages_->meet([this](int node) { return system_.position(node); },
+                  [this](int node, int component, double length) {
+                    Eigen::Vector3d x = system_.position(node);
+                    x[component] += length;
+                    system_.setPosition(node, x);
+                  });
+}
+
+/// An average spreads its force over the nodes.
+double ChainPart::forceScale() const
+{
+  double largest = system_.forceScale();
+  if (averages_)
+    largest = std::max(largest, averages_->forces.cwiseAbs().maxCoeff() /
+                                    static_cast<double>(std::max<Eigen::Index>(1, system_.nodes() / averages_->count())));
+  return largest;
 }
 
 // ---- the matrix of the island

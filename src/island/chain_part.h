@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "island/part.h"
+#include "island/schur_complement.h"
 #include "slender_sim/dynamics/chain_system.h"
 
 namespace slender {
@@ -24,7 +26,9 @@ public:
 
   void evaluate(bool with_hessian, const HessianShift& shift) override;
   void closeGradient() override { system_.closeGradient(); }
-  void solve() override { system_.solve(); }
+  void solve() override;
+  AverageConstraints* averages() override { return averages_.get(); }
+  void meetAverages() override;
 
   void notePattern(SharedMatrix& matrix) override;
   void findEntries(const SharedMatrix& matrix) override;
@@ -40,7 +44,7 @@ public:
   double incrementSize(double) const override { return system_.incrementSize(); }
   double slope() const override { return system_.slope(); }
   double residual() const override { return system_.residual(); }
-  double forceScale() const override { return system_.forceScale(); }
+  double forceScale() const override;
   double noiseLevel() const override { return system_.noiseLevel(); }
 
 protected:
@@ -50,6 +54,7 @@ protected:
   void numberFree();
 
   ChainSystem& system_;
+  std::unique_ptr<AverageConstraints> averages_;   ///< null: no averages are prescribed
   /// Per unknown of the chain, four per node: its number within the part, kPrescribed, or less where something else
   /// carries it.
   std::vector<int> dof_;
@@ -60,6 +65,7 @@ private:
   void addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
 
   int unknowns_ = 0;
+  SchurComplement schur_;   ///< of the averages, while the part is not coupled
   /// For every place of the panels: the index of its entry among the values of the island's matrix. -1: the place has
   /// no entry.
   std::vector<int> entries_;

@@ -77,8 +77,16 @@ void Equations::place(double fraction)
     placeSolids(fraction, prescribed_);
   for (Part* part : parts_)
     part->placeHeld(fraction);
+  follow();
+}
+
+/// Puts into the trial what follows from the motion of the parts.
+void Equations::follow()
+{
   for (Part* part : parts_)
     part->followJoints();
+  for (Part* part : parts_)
+    part->meetAverages();
 }
 
 bool Equations::solidsMove() const
@@ -181,8 +189,7 @@ double Equations::roomToTrial()
 void Equations::moveAlong(double alpha)
 {
   forParts([&](Part& part) { part.moveAlong(alpha); });
-  for (Part* part : parts_)
-    part->followJoints();
+  follow();
 }
 
 void Equations::accept()

@@ -7,6 +7,7 @@
 
 #include "confined_newton.h"
 #include "island/part.h"
+#include "island/schur_complement.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose_motion.h"
 
@@ -153,6 +154,9 @@ private:
   void addForce(const ContactTerm& term);
   void assemble(const HessianShift& shift, bool whole);
   bool factor(const HessianShift& shift);
+  bool anyAverages() const;
+  void keepAverages();
+  void follow();
 
   std::vector<Part*> parts_;
   int threads_ = 0;
@@ -160,6 +164,8 @@ private:
   double duration_ = 1.0;
 
   SharedMatrix matrix_;
+  SchurComplement schur_;            ///< of the averages of coupled parts
+  std::vector<double> constrained_;   ///< direction of all coupled unknowns
   bool pattern_valid_ = false, exact_ = false;
   HessianShift shift_;   ///< of the last evaluation with a Hessian
   int linear_iterations_ = 0;

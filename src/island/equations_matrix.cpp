@@ -193,6 +193,8 @@ SharedMatrix::Solver Equations::chooseSolver()
   std::sort(met_.begin(), met_.end());
   met_.erase(std::unique(met_.begin(), met_.end()), met_.end());
   constexpr int kPairsPerBlock = 2, kLeastUnknowns = 40'000;
+  if (anyAverages())   // the Schur complement needs many exact solutions
+    return SharedMatrix::Solver::cholesky;
   const bool loops = static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_;
   return loops && matrix_.unknowns() >= kLeastUnknowns ? SharedMatrix::Solver::conjugate_gradients
                                                        : SharedMatrix::Solver::cholesky;
@@ -308,11 +310,59 @@ void Equations::solve()
     matrix_.factorDirectly();
     matrix_.solve();
   }
+  if (anyAverages())
+    keepAverages();
   forParts([](Part& part) {
     if (!part.coupled)
       part.solve();
   });
   spread();
+}
+
+bool Equations::anyAverages() const
+{
+  return std::any_of(parts_.begin(), parts_.end(), [](Part* part) { return part->coupled && part->averages(); });
+}
+
+/// Takes out of the solution what would change the prescribed averages of coupled parts. Points may be carried by
+/// bodies, whose unknowns then take part.
+void Equations::keepAverages()
+{
+  Eigen::Index rows = 0;
+  for (Part* part : parts_)
+    if (part->coupled && part->averages())
+      rows += 3 * part->averages()->count();
+  schur_.begin(rows, matrix_.unknowns());
+  Eigen::Index first = 0;
+  for (Part* part : parts_)
+  {
+    if (!part->coupled || !part->averages())
+      continue;
+    part->averages()->forEntries([&](Eigen::Index i, int point, double weight) {
+      for (int c = 0; c < 3; ++c)
+      {
+        Part::Columns row;
+        part->addColumns(point, c, weight, row);
+        for (int k = 0; k < row.count; ++k)
+          schur_.add(first + 3 * i + c, row.index[k], row.value[k]);
+      }
+    });
+    first += 3 * part->averages()->count();
+  }
+  constrained_.assign(matrix_.solution(), matrix_.solution() + matrix_.unknowns());
+  schur_.correct(constrained_.data(), [&](double* x) {
+    std::copy_n(x, constrained_.size(), matrix_.solution());
+    matrix_.solve();
+    std::copy_n(matrix_.solution(), constrained_.size(), x);
+  });
+  std::copy(constrained_.begin(), constrained_.end(), matrix_.solution());
+  const double* change = schur_.change().data();
+  for (Part* part : parts_)
+    if (part->coupled && part->averages())
+    {
+      part->averages()->addMultipliers(change);
+      change += 3 * part->averages()->count();
+    }
 }
 
 void Equations::spread()

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "island/average_constraints.h"
 #include "island/shared_matrix.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/dynamics/failure_place.h"
@@ -76,6 +77,9 @@ public:
 /// A part that contacts or joints connect to another part is coupled: its unknowns are in the matrix of the island. A
 /// part that is not coupled solves with its own matrix. It stays so while it touches only what moves as prescribed,
 /// because such contacts couple no more than neighbouring points of the part; they are its own contacts.
+///
+/// The averages of a part may be prescribed. Then Equations makes the directions of coupled parts leave these alone, and
+/// the part does so in its own solve(). Its gradient has the forces of the averages.
 class Part : public PartInIsland, public PartSurface
 {
 public:
@@ -102,6 +106,10 @@ public:
   virtual void retreatHeld(double) {}
   /// Puts into the trial what joints make the part follow, after all parts have moved.
   virtual void followJoints() {}
+  /// Averages of its points that are prescribed; null: none.
+  virtual AverageConstraints* averages() { return nullptr; }
+  /// Moves free points of the trial so that the averages are those that are prescribed, after followJoints().
+  virtual void meetAverages() {}
 
   // ---- equations
   /// Computes energy, gradient and, on request, the Hessian at the trial, and keeps the sums in `evaluation`. A part

@@ -56,10 +56,19 @@ bool RodPart::numberUnknowns()
 
 // ---- configuration
 
+void RodPart::placeHeld(double fraction)
+{
+  rod_.placeAt(*inputs_, duration_, fraction);
+  if (averages_)
+    averages_->place(fraction);
+}
+
 bool RodPart::heldMoves(double from_fraction, double to_fraction) const
 {
   if (from_fraction == to_fraction)
     return false;
+  if (averages_ && averages_->move())
+    return true;
   const std::vector<GraspState>& grasps = rod_.work.grasps;
   for (std::size_t k = 0; k < grasps.size(); ++k)
   {

@@ -15,12 +15,15 @@ namespace slender {
 class RodPart : public ChainPart
 {
 public:
-  RodPart(RodStepper::Impl& rod, bool touches)
+  /// averages: weights of averages that are prescribed, count x nodes, see AverageConstraints; null: none are.
+  RodPart(RodStepper::Impl& rod, bool touches, const AverageConstraints::Matrix* averages = nullptr)
     : ChainPart(rod.system),
       rod_(rod),
       touches_(touches),
       shortest_edge_(rod.model->rest_length.minCoeff())
   {
+    if (averages)
+      averages_ = std::make_unique<AverageConstraints>(*averages);
   }
 
   /// A grasp of the rod follows a simulated body; X_BG: the frame of the grasp in that of the body.
@@ -47,18 +50,12 @@ public:
   int points() const override { return touches_ ? system_.nodes() : 0; }
   void addSurface(ContactSurface& surface) const override;
 
-protected:
-  double duration() const { return duration_; }   ///< of the step [s]
-  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
-  void beginStage(std::size_t stage) override;
-  void endStage(std::size_t stage, bool last, StepReport& report) override;
-
 private:
   // ---- as Part
   int nodeOf(int point) const override { return point; }
   bool numberUnknowns() override;
   bool joined() const override { return welded_; }
-  void placeHeld(double fraction) override { rod_.placeAt(*inputs_, duration_, fraction); }
+  void placeHeld(double fraction) override;
   bool heldMoves(double from, double to) const override;
   void followJoints() override;
   void gather(Eigen::Matrix3Xd& x) const override;
@@ -69,6 +66,9 @@ private:
   void addColumns(int point, int component, double weight, Columns& row) const override;
 
   // ---- its steps
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
+  void beginStage(std::size_t stage) override;
+  void endStage(std::size_t stage, bool last, StepReport& report) override;
   double lastSubstep() const override { return rod_.work.last_step; }
   double shortestEdge() const override { return shortest_edge_; }
   void addStartLoads() override;

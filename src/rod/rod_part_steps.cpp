@@ -9,7 +9,12 @@ StepFailure RodPart::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
   plan_ = &plan;
   substep_ = substep;
-  return rod_.beginStep(plan, *inputs_, duration_, substep.from, substep.length);
+  const StepFailure failure = rod_.beginStep(plan, *inputs_, duration_, substep.from, substep.length);
+  if (failure != StepFailure::none || !averages_)
+    return failure;
+  return averages_->prepare(rod_.model->mass, [this](int node) { return system_.isFree(node); })
+             ? StepFailure::none
+             : StepFailure::singular_matrix;   // averages depend on each other
 }
 
 /// Contacts count from the first step on.
@@ -114,6 +119,11 @@ void RodPart::beginStage(std::size_t stage)
   rod_.beginStage(stage, *inputs_, duration_, substep_.from, substep_.length);
   setCarriedInertia(plan_->stages[stage]);
   followJoints();
+  if (!averages_)
+    return;
+  averages_->forces.setZero();
+  averages_->place((substep_.from + plan_->stages[stage].time * substep_.length) / duration_);
+  meetAverages();
 }
 
 void RodPart::endStage(std::size_t stage, bool last, StepReport& report)
@@ -154,7 +164,10 @@ double RodPart::energyAtStart(double& allowance)
 
 void RodPart::refuse(StepFailure failure, double length, StepReport& report) const
 {
-  rod_.refuseUnsolved(report, failure, length, false);
+  const char* dependent =
+      "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
+  rod_.refuseUnsolved(report, failure, length, false,
+                      averages_ && failure == StepFailure::singular_matrix ? dependent : "");
 }
 
 }   // namespace slender

@@ -278,7 +278,7 @@ Largest RodStepper::Impl::unbalancedForce() const
 }
 
 StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step,
-                                            const std::string& why, bool multipliers)
+                                            const std::string& why)
 {
   // explicit steps end in a state that says nothing; that at their start shows what is about to blow up
   Largest strain, node;
@@ -288,7 +288,7 @@ StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure fail
         j, implicit
                ? std::abs(system.arrays().strain[j])
                : std::abs((work.x.col((j + 1) % model->nodes()) - work.x.col(j)).norm() / model->rest_length[j] - 1.0));
-  if (implicit && !multipliers)
+  if (implicit)
     node = unbalancedForce();
   else
     for (int i = 0; i < model->nodes() && explicit_step; ++i)

@@ -47,10 +47,9 @@ public:
   /// Largest unbalanced force [N] on a free node in the last evaluation of an implicit step.
   Largest unbalancedForce() const;
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the rod was farthest
-  /// from a solution. `why`: takes the place of explainFailure(). With `multipliers`, forces that the system does not
-  /// know balance the rod, and are not looked at.
+  /// from a solution. `why`: takes the place of explainFailure().
   StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step,
-                            const std::string& why = "", bool multipliers = false);
+                            const std::string& why = "");
   Eigen::Vector3d load(const RodInputs& inputs, int node) const;
 
   // rod_stages.cpp: an implicit substep; the stages' equations are solved between beginStage and endStage or finishStep

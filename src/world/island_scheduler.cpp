@@ -13,7 +13,7 @@ namespace {
 /// Returns the content, which is valid.
 WorldContent checked(const WorldModel& world, WorldContent content)
 {
-  const auto need = [](bool good, const std::string& what) {
+  const auto need = [](bool good, const auto& what) {   // a text is made only where it is needed
     if (!good)
       throw std::invalid_argument(what);
   };

@@ -52,11 +52,9 @@ std::shared_ptr<const WeakConstraints> constraintsOf(const WorldModel::Rod& rod)
 }
 
 /// Throws std::invalid_argument if a rod cannot track its guide in these steps.
-void checkTracking(const TimeConfig& time, const std::string& rod, bool meets)
+void checkTracking(const TimeConfig& time, const std::string& rod)
 {
   const std::string who = "rod '" + rod + "': ";
-  if (meets)
-    throw std::invalid_argument(who + "a rod that tracks a guide has no contact and no welds: leave out one of them");
   if (time.integrator != Integrator::implicit_euler || time.error_tolerance > 0)
     throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler, with fixed steps");
 }
@@ -138,16 +136,15 @@ RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time
     whole(std::make_unique<RodStepper>(world.rods[number].model, time)),
     stepper(&whole->impl()),
     constraints(constraintsOf(world.rods[number])),
-    part(constraints ? std::make_unique<AveragedPart>(*stepper, constraints->matrix())
-                     : std::make_unique<RodPart>(*stepper, touches(world.rods[number]))),
+    part(std::make_unique<RodPart>(*stepper, touches(world.rods[number]),
+                                   constraints ? &constraints->matrix() : nullptr)),
     meets(meetsOthers(world, number)),
     contact_(world.rods[number].contact),
-    averages_(dynamic_cast<AveragedPart*>(part.get())),
     guide_size_(world.rods[number].tracked.size),
     duration_(world.time.step)
 {
   if (constraints)
-    checkTracking(world.time, stepper->model->name, meets);
+    checkTracking(world.time, stepper->model->name);
   if (contact_)
     part->setContact(*contact_, world.rods[number].ignored);
 }
@@ -156,21 +153,21 @@ bool RodObject::load(const WorldState& state, const WorldInputs& with, StepRepor
 {
   stepper->begin(state.rods[index]);
   part->begin(inputs, duration_);
-  if (!averages_)
+  if (!constraints)
     return true;
   constraints->averages(with.rod_guides[index], targets_);
   if (!targets_.allFinite())
     return refuseInput(name() + ": its guide", report);
-  averages_->setTargets(targets_);
+  part->averages()->begin(state.rods[index].x, targets_);
   return true;
 }
 
 void RodObject::finishGuide(const WorldInputs& with, WorldState& state, StepReport& report) const
 {
-  if (!averages_)
+  if (!constraints)
     return;
   state.rod_guides[index].points = with.rod_guides[index];
-  state.rod_guides[index].forces = averages_->forces;
+  state.rod_guides[index].forces = part->averages()->forces;
   report.tracking_error =
       std::max(report.tracking_error, constraints->error(targets_, state.rods[index].x) / guide_size_);
 }

@@ -8,7 +8,7 @@
 
 #include "cloth/cloth_part.h"
 #include "island/island.h"
-#include "rod/averaged_part.h"
+#include "rod/rod_part.h"
 #include "rod/rod_part.h"
 #include "thread/thread_part.h"
 #include "island_finder.h"
@@ -63,7 +63,7 @@ public:
   void addTo(Meeting& meeting, const WorldState& state) override;
 
   /// Null: it may meet others, or tracks a guide.
-  RodStepper* alone() { return meets || averages_ ? nullptr : whole.get(); }
+  RodStepper* alone() { return meets || constraints ? nullptr : whole.get(); }
   /// Writes the guide and its forces into the state after a step, if the rod tracks a guide.
   void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const;
 
@@ -76,10 +76,9 @@ public:
 
 private:
   const std::optional<ContactProperties>& contact_;
-  AveragedPart* const averages_;   ///< the part of a rod that tracks a guide
-  Eigen::Matrix3Xd targets_;       ///< of its averages at the end of the step [m]
-  const double guide_size_;        ///< [m]
-  const double duration_;          ///< of a step [s]
+  Eigen::Matrix3Xd targets_;   ///< of its averages at the end of the step [m]
+  const double guide_size_;    ///< [m]
+  const double duration_;      ///< of a step [s]
 };
 
 /// A simulated body.

@@ -9,8 +9,8 @@
 
 #include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_shapes.h"
-#include "slender_sim/rod/averaged_rod.h"
 #include "slender_sim/scene/state_bytes.h"
+#include "slender_sim/tracking/weak_constraints.h"
 #include "test/support/groups.h"
 #include "test/support/thread_world.h"
 #include "test/support/threads.h"
@@ -443,33 +443,38 @@ TEST(FailedSteps, RefusalsOfRodsWithAveragesLeaveNothing)
   RodModel model = openRod(nodes, modulusSection(1e-3, 1e-3, 200.0, 0.1), true);
   model.stiffness_damping = 1e-3;
   const auto shared = std::make_shared<const RodModel>(model);
-  AveragedRod::Averages averages(2, n);
+  TestFunctions functions;
+  functions.names = {"first", "last"};
+  functions.tracked.resize(2, n);
   for (int i = 0; i < 12; ++i)
   {
-    averages.insert(0, i) = 1.0 / 12;
-    averages.insert(1, 13 + i) = 1.0 / 12;
+    functions.tracked.insert(0, i) = 1.0;
+    functions.tracked.insert(1, 13 + i) = 1.0;
   }
-  averages.makeCompressed();
-  const auto weights = std::make_shared<const AveragedRod::Averages>(averages);
+  functions.guide = functions.tracked;
+  const MassMatrix mass = hatMassMatrix(nodes, false);
+  FunctionSet set;
+  set.constraints = std::make_shared<const WeakConstraints>(functions, mass, mass);
   RodState start = makeRodState(model, nodes, Vector3d::UnitZ());
   for (int i = 0; i < n; ++i)
     start.v.col(i) = Vector3d(0, 2 * std::sin(9.0 * i), 6 * std::sin(0.5 * i));
-  const RodInputs inputs;
-  Matrix3Xd targets = start.x * averages.transpose();
-  TimeConfig time = withIntegrator(Integrator::implicit_euler);
-  AveragedRod refused(shared, weights, time), fresh(shared, weights, time);
-  RodInputs spoilt = inputs;
-  spoilt.forces.setZero(3, n);
-  spoilt.forces.col(7) << 0, 1e300, -1e300;
-  RodState a = start, b = start;
-  EXPECT_FALSE(refused.step(a, spoilt, targets, 5e-3).ok);
-  EXPECT_TRUE(bytesOf(a) == bytesOf(start));
-  for (int k = 0; k < 3; ++k)
-  {
-    EXPECT_TRUE(refused.step(a, inputs, targets, 5e-3).ok);
-    EXPECT_TRUE(fresh.step(b, inputs, targets, 5e-3).ok);
-    EXPECT_TRUE(bytesOf(a) == bytesOf(b)) << k;
-  }
+  WorldModel world;
+  world.time = withIntegrator(Integrator::implicit_euler);
+  world.time.step = 5e-3;
+  world.rods.emplace_back().model = shared;
+  world.rods[0].tracked.sets = std::make_shared<const std::vector<FunctionSet>>(1, set);
+  WorldState state;
+  state.rods.push_back(start);
+  state.rod_guides.resize(1);
+  WorldInputs inputs;
+  inputs.rods.resize(1);
+  inputs.rod_guides = {start.x};
+  WorldInputs spoilt = inputs;
+  spoilt.rods[0].forces.setZero(3, n);
+  spoilt.rods[0].forces.col(7) << 0, 1e300, -1e300;
+  expectRefusalLeavesNothing<WorldState, WorldInputs, WorldStepper>(
+      "tracked rod", state, inputs, spoilt, world.time.step,
+      [&] { return WorldStepper{std::make_unique<World>(world, state)}; });
 }
 
 }   // namespace

@@ -269,8 +269,6 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
 /// Reports what the rod has that does not go with a guide.
 void checkTraits(const YamlCursor& at, const RodConfig& rod)
 {
-  if (rod.contact)
-    at.problem("is not for a rod that touches things; leave out contact or track");
   if (rod.stretching == Stretching::projected)
     at.problem("takes implicit steps; with it stretching must be stiff");
 }

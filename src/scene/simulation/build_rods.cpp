@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "island/average_projection.h"
 #include "scene_parts.h"
 #include "scene_rod.h"
-#include "slender_sim/rod/average_projection.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/shapes.h"
 
@@ -82,18 +82,23 @@ RodInputs loadsOf(SceneConfig& scene, int r, const RodModel& model)
 }
 
 /// Where the scene starts the averages are the guide's, and their velocities: by the least change of the nodes that no
-/// grasp holds.
-void placeOnGuide(const RodConfig& config, const RodModel& model, GuideState& guide, Eigen::Matrix3Xd& nodes,
+/// grasp or body holds.
+void placeOnGuide(const SceneConfig& scene, int r, const RodModel& model, GuideState& guide, Eigen::Matrix3Xd& nodes,
                   Eigen::Matrix3Xd& velocities)
 {
+  const RodConfig& config = scene.rods[r];
   const WeakConstraints& constraints = *config.tracking->sets.front().constraints;
   Eigen::Matrix3Xd guide_velocities;
   config.tracking->guide.evaluate(0.0, guide.points, &guide_velocities);
   guide.forces.setZero(3, constraints.count());
 
-  const auto isFree = [&config](int node) {
-    return std::none_of(config.grasps.begin(), config.grasps.end(),
-                        [node](const GraspConfig& g) { return g.first_node <= node && node <= g.last_node; });
+  const auto isFree = [&](int node) {
+    const auto holds = [node](const auto& held) { return held.first_node <= node && node <= held.last_node; };
+    return std::none_of(config.grasps.begin(), config.grasps.end(), holds) &&
+           std::none_of(scene.bodies.begin(), scene.bodies.end(), [&](const BodyConfig& body) {
+             return std::any_of(body.welds.begin(), body.welds.end(),
+                                [&](const WeldConfig& weld) { return weld.rod == r && holds(weld); });
+           });
   };
   AverageProjection projection(constraints.matrix());
   if (!projection.prepare(model.mass, isFree))
@@ -110,23 +115,6 @@ void placeOnGuide(const RodConfig& config, const RodModel& model, GuideState& gu
     nodes.row(k) += projection.displacements(away.row(k).transpose()).transpose();
     velocities.row(k) = projection.displacements(speeds.row(k).transpose()).transpose();
   }
-}
-
-/// What a rod follows. Throws for rods that are joined to others.
-TrackedGuide trackedBy(const SceneConfig& scene, int r)
-{
-  const RodConfig& rod = scene.rods[r];
-  if (!rod.tracking)
-    return {};
-  const bool welded =
-      std::any_of(scene.bodies.begin(), scene.bodies.end(), [r](const BodyConfig& body) { return carries(body, r); });
-  if (rod.contact || welded)
-  {
-    throw std::invalid_argument(
-        "a rod that tracks a guide can neither touch anything nor be welded to a body; leave out " +
-        std::string(rod.contact ? "its contact" : "the weld") + ", or track");
-  }
-  return {{rod.tracking, &rod.tracking->sets}, rod.tracking->size, -1};
 }
 
 void addGrasps(SceneConfig& scene, int r, const RodModel& model, RodState& state, std::vector<GraspRef>& grasps)
@@ -157,7 +145,7 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
   if (rod.tracking)
   {
     parts.state.rod_guides.resize(scene.rods.size());
-    placeOnGuide(rod, built.model, parts.state.rod_guides[r], initial, velocities);
+    placeOnGuide(scene, r, built.model, parts.state.rod_guides[r], initial, velocities);
   }
   RodState state = startSceneRod(rod, built, initial);
   if (velocities.cols() > 0)
@@ -167,7 +155,8 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
   WorldModel::Rod part;
   part.model = std::make_shared<const RodModel>(std::move(built.model));
   part.contact = rod.contact;
-  part.tracked = trackedBy(scene, r);
+  if (rod.tracking)
+    part.tracked = {{rod.tracking, &rod.tracking->sets}, rod.tracking->size, -1};
   parts.model.rods.push_back(std::move(part));
   parts.state.rods.push_back(std::move(state));
 }

@@ -44,7 +44,7 @@ void buildBodies(const SceneConfig& scene, SceneParts& parts)
     body.friction = config.friction.value_or(-1.0);
     parts.model.bodies.push_back(std::move(body));
     for (const WeldConfig& weld : config.welds)
-      parts.model.welds.push_back({weld.rod, weld.first_node, weld.last_node, static_cast<int>(b)});
+      parts.model.welds.push_back({weld.rod, weld.first_node, weld.last_node, static_cast<int>(b), std::nullopt});
     RigidBodyState state;
     state.X_WB = config.pose;
     state.velocity = config.velocity;

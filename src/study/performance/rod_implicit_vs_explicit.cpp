@@ -127,7 +127,10 @@ void runImplicitVsExplicit(StudyContext& context)
     Strand explicit_run = play(soft, timeConfig(Integrator::symplectic_euler, explicit_step), frames);
     if (!explicit_run.failure.empty())   // what was stable for half a second need not be so for ten
       explicit_run = play(soft, timeConfig(Integrator::symplectic_euler, 0.8 * explicit_step), frames);
-    require(StepReport{explicit_run.failure.empty(), StepFailure::none, explicit_run.failure}, "explicit hair");
+    StepReport outcome;
+    outcome.ok = explicit_run.failure.empty();
+    outcome.message = explicit_run.failure;
+    require(outcome, "explicit hair");
 
     context.progress(soft ? 2 : 12, 20, std::string(material) + ", converged solution");
     const Strand exact = play(soft, timeConfig(Integrator::tr_bdf2, 5e-5, 1e-8), frames);

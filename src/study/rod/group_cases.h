@@ -19,7 +19,7 @@ struct GroupSetup
   /// Takes the rod over as it is; returns its index.
   int add(const RodSetup& rod)
   {
-    model.rods.push_back({rod.model, {}, {}});
+    model.rods.emplace_back().model = rod.model;
     state.rods.push_back(rod.state);
     inputs.rods.push_back(rod.inputs);
     return static_cast<int>(model.rods.size()) - 1;

@@ -8,9 +8,9 @@
 #include <Eigen/Geometry>
 
 #include "study/framework/scene_cases.h"
-#include "slender_sim/rod/averaged_rod.h"
-#include "study/framework/cpu_clock.h"
 #include "slender_sim/tracking/weak_constraints.h"
+#include "slender_sim/world/world.h"
+#include "study/framework/cpu_clock.h"
 
 namespace slender::study {
 
@@ -105,20 +105,31 @@ enum class Motion
 /// goes on at that speed.
 BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
 {
-  TimeConfig time;
-  time.integrator = Integrator::implicit_euler;
-  RodState state = makeRodState(*band.model, band.guide, Vector3d::UnitZ());
+  WorldModel model;
+  model.time.integrator = Integrator::implicit_euler;
+  model.time.step = kStep;
+  model.rods.emplace_back().model = band.model;
+  WorldState world_state;
+  WorldInputs world_inputs;
+  RodState& state = world_state.rods.emplace_back(makeRodState(*band.model, band.guide, Vector3d::UnitZ()));
+  RodInputs& inputs = world_inputs.rods.emplace_back();
   const int nodes = band.model->nodes(), per_segment = nodes / kAnchors;
-  RodInputs inputs;
   inputs.gravity.setZero();
-  if (!averages)
+  if (averages)
+  {
+    FunctionSet set;
+    set.constraints = band.segments;
+    model.rods[0].tracked.sets = std::make_shared<const std::vector<FunctionSet>>(1, set);
+    world_state.rod_guides.resize(1);
+    world_inputs.rod_guides.resize(1);
+  }
+  else
     for (int r = 0; r < kAnchors; ++r)
     {
       state.grasps.push_back(makeGrasp(*band.model, state, r * per_segment, r * per_segment, false));
       inputs.grasps.push_back({state.grasps.back().X_WG, std::nullopt});
     }
-  RodStepper held(band.model, time);
-  AveragedRod averaged(band.model, std::make_shared<const WeakConstraints::Matrix>(band.segments->matrix()), time);
+  World world(model, world_state);
   const int settle = static_cast<int>(std::lround(kSettle / kStep)),
             pulse = static_cast<int>(std::lround(kPulse / kStep)), after = 4 * pulse;
   BandRun result;
@@ -134,14 +145,15 @@ BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
     const Matrix3Xd guide = (turn * band.guide).colwise() + way;
     for (int r = 0; r < static_cast<int>(inputs.grasps.size()); ++r)
       inputs.grasps[r].X_WG.position = guide.col(r * per_segment);
+    if (averages)
+      world_inputs.rod_guides[0] = guide;
     const double begin = threadSeconds();
-    const Matrix3Xd targets = band.segments->averages(guide);
-    const StepReport report = averages ? averaged.step(state, inputs, targets, kStep) : held.step(state, inputs, kStep);
+    const StepReport report = world.step(world_state, world_inputs);
     seconds += threadSeconds() - begin;
     if (!report.ok)
       throw std::runtime_error(report.message);
     if (averages)
-      result.error = std::max(result.error, band.segments->error(targets, state.x));
+      result.error = std::max(result.error, world.rodTrackingError(0, world_state));
     if (k == settle)
       result.still = state.x;
     if (k == settle + pulse)
