@@ -61,19 +61,16 @@ class Bodies(NodeCase):
         state = self.listen("/t/state", RodState)
         wrench = self.listen("/t/grasps/left/wrench", WrenchStamped)
         told = self.listen("/t/body_states", BodyStates)
-        self.states_after(state, 2)
-        wait_until(lambda: wrench.last().header.stamp == state.last().header.stamp, what="the first wrench")
-        before = wrench.last().wrench.force.x
+        before = wrench.at(self.step(2).stamp).wrench.force.x
         self.drive("cart", (1.1, 0, 1), (1.15, 0, 1), 0.5)
-        last = self.states_after(state, 300).nodes[-1]
+        stamp = self.step(300).stamp
+        last = state.at(stamp).nodes[-1]
         self.assertLess(math.dist((last.x, last.y, last.z), (1.05, 0, 1)), 1e-9)
-        wait_until(lambda: wrench.last().header.stamp == state.last().header.stamp, what="the wrench")
         # E A times the strain of 5 %, and a little from the sag
-        self.assertGreater(wrench.last().wrench.force.x - before, 2.0)
-        self.assertLess(wrench.last().wrench.force.x, 3.5)
-        wait_until(lambda: told.last().header.stamp == state.last().header.stamp, what="the bodies")
-        self.assertEqual(told.last().name, ["cart", "ball"])
-        self.assertAlmostEqual(told.last().pose[0].position.x, 1.15, places=9)
+        self.assertGreater(wrench.at(stamp).wrench.force.x - before, 2.0)
+        self.assertLess(wrench.at(stamp).wrench.force.x, 3.5)
+        self.assertEqual(told.at(stamp).name, ["cart", "ball"])
+        self.assertAlmostEqual(told.at(stamp).pose[0].position.x, 1.15, places=9)
 
     def test_welds_turn_with_their_body(self):
         self.start(CART_AND_BALL)
@@ -88,8 +85,7 @@ class Bodies(NodeCase):
         tf = self.listen("/tf", TFMessage)
         state = self.listen("/t/state", RodState)
         stamp = self.step(100).stamp   # 0.5 s
-        wait_until(lambda: told.last().header.stamp == stamp, what="the bodies")
-        ball, twist = told.last().pose[1], told.last().twist[1]
+        ball, twist = told.at(stamp).pose[1], told.at(stamp).twist[1]
         h = 0.005
         self.assertAlmostEqual(ball.position.x, 5.5, places=9)
         self.assertLess(abs(ball.position.z - (2 - 0.5 * 9.81 * 0.25)), 9.81 * 0.5 * h)   # implicit Euler is of first order
@@ -102,7 +98,7 @@ class Bodies(NodeCase):
                          [("world", "ball"), ("world", "t/rod/grasps/left"),
                           ("world", "t/rod/rods/rope/tip")])
         tip, q = frames[2].transform.translation, frames[2].transform.rotation
-        before, end = state.last().nodes[-2:]
+        before, end = state.at(stamp).nodes[-2:]
         self.assertEqual((tip.x, tip.y, tip.z), (end.x, end.y, end.z))
         tangent = (1 - 2 * (q.y**2 + q.z**2), 2 * (q.x * q.y + q.w * q.z), 2 * (q.x * q.z - q.w * q.y))
         edge = (end.x - before.x, end.y - before.y, end.z - before.z)

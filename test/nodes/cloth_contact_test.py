@@ -3,12 +3,13 @@
 import math
 
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from slender_sim.msg import BodyStates, ClothState, MeshStamped
 from slender_sim.srv import FilePath
 from visualization_msgs.msg import MarkerArray
 
-from node_harness import NodeCase, fill, pose, run, wait_until
+from node_harness import NodeCase, fill, pose, run, status_of, wait_until
 
 STEP = 0.01
 RADIUS = 0.06
@@ -76,8 +77,8 @@ class ClothContact(NodeCase):
         ball, touched = {}, 0
         for _ in range(100):
             state = self.states_after(states, 1)
-            wait_until(lambda: told.last().header.stamp == state.header.stamp, what="the ball")
-            centre = told.last().pose[told.last().name.index("ball")].position
+            bodies = told.at(state.header.stamp)
+            centre = bodies.pose[bodies.name.index("ball")].position
             ball = (centre.x, centre.y, centre.z)
             points = [(v.x, v.y, v.z) for v in state.vertices]
             near = min(distance(ball, *[points[corners[3 * f + c]] for c in range(3)]) for f in range(len(corners) // 3))
@@ -89,13 +90,11 @@ class ClothContact(NodeCase):
         self.assertGreater(len(in_front), 0)
         for p in in_front:
             self.assertGreater(p[1], ball[1] + 0.9 * math.sqrt(RADIUS ** 2 - 0.03 ** 2))
-        wait_until(lambda: wrench.last().header.stamp == state.header.stamp, what="the wrench")
-        self.assertGreater(wrench.last().wrench.force.y, 0.02)
-        def counted():                   # since the last report: while steps are made
-            self.step(10)
-            values = self.diagnostics("simulation")
-            return float(values["contacts per step"]) > 0
-        wait_until(counted, what="contacts in the diagnostics")
+        self.assertGreater(wrench.at(state.header.stamp).wrench.force.y, 0.02)
+        reports = self.listen("/diagnostics", DiagnosticArray)   # each counts since the one before it
+        self.step(10)
+        wait_until(lambda: any(float(status_of(report, "simulation")["contacts per step"]) > 0
+                               for report in reports.all()), what="contacts in the diagnostics")
         wait_until(lambda: markers.count() > 0, what="markers")
         drawn = {m.ns: m for m in markers.last().markers}
         self.assertAlmostEqual(drawn["bodies"].scale.x, 2 * RADIUS)

@@ -68,8 +68,7 @@ class Cloth(NodeCase):
         for i in held:                   # attach: initial; the first pose is at f = 1/50
             self.assertAlmostEqual(state.vertices[i].x - start.vertices[i].x, 0.049, delta=1e-6)
             self.assertAlmostEqual(state.vertices[i].z - start.vertices[i].z, 0.294, delta=1e-6)
-        wait_until(lambda: all(w.last().header.stamp == state.header.stamp for w in wrenches), what="the wrenches of that state")
-        forces = [w.last().wrench.force for w in wrenches]
+        forces = [wrench.at(state.header.stamp).wrench.force for wrench in wrenches]
         self.assertAlmostEqual(forces[0].z + forces[1].z, -WEIGHT, delta=2e-3 * WEIGHT)
         self.assertAlmostEqual(forces[0].x + forces[1].x, 0.0, delta=2e-3 * WEIGHT)
         self.assertAlmostEqual(forces[0].z, forces[1].z, delta=0.02 * WEIGHT)
@@ -107,13 +106,13 @@ class Cloth(NodeCase):
         air = self.publisher("/t/wind", Vector3Stamped)
         wrench = self.listen("/t/grasps/left/wrench", WrenchStamped)
         still = self.after(300)
-        calm = wrench.last().wrench.force
+        calm = wrench.at(still.header.stamp).wrench.force
         self.assertAlmostEqual(calm.y, 0.0, delta=0.02 * WEIGHT)
         air.publish(wind(0, 6, 0))
         self.arrived()
         blown = self.after(200)
         self.assertGreater(sum(v.y for v in blown.vertices), sum(v.y for v in still.vertices) + 0.5)
-        self.assertGreater(wrench.last().wrench.force.y, 0.05 * WEIGHT)
+        self.assertGreater(wrench.at(blown.header.stamp).wrench.force.y, 0.05 * WEIGHT)
         for bad in (wind(float("nan"), 0, 0), wind(1, 0, 0, frame=""), wind(1, 0, 0, frame="nowhere"), wind(0, 0, 1e5)):
             air.publish(bad)
         for reason in ("not_finite", "bad_frame", "no_transform", "out_of_range"):
@@ -152,8 +151,7 @@ class Cloth(NodeCase):
         self.assertEqual(len(state.velocities), 126)
         self.assertTrue(all(t < 63 for t in mesh.triangles[:3 * 96]) and all(63 <= t < 126 for t in mesh.triangles[3 * 96:]))
         self.assertAlmostEqual(mesh.vertices[63].x, 1.0, places=12)        # undeformed
-        wait_until(lambda: points.last().header.stamp == state.header.stamp, what="points")
-        cloud = list(point_cloud2.read_points(points.last(), ("x", "y", "z")))
+        cloud = list(point_cloud2.read_points(points.at(state.header.stamp), ("x", "y", "z")))
         for p, v in zip(cloud, state.vertices):
             self.assertAlmostEqual(p[2], v.z, places=6)
         wait_until(lambda: markers.count() > 0, what="markers")

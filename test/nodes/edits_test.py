@@ -113,8 +113,7 @@ class Edits(NodeCase):
         after = self.states_after(state, 60)
         self.assertEqual(after.step, 100)
         self.assertEqual(after.epoch, before.epoch)   # nothing jumped
-        wait_until(lambda: bodies.last().header.stamp == after.header.stamp, what="the ball")
-        ball = bodies.last().pose[0].position.z
+        ball = bodies.at(after.header.stamp).pose[0].position.z
         self.assertGreater(ball, middle(after) + 0.035)   # the radii are 0.04 together
         self.assertLess(ball, middle(after) + 0.06)
         wait_until(lambda: any("ball" in m.ns or "bod" in m.ns for message in markers.all() for m in message.markers),
@@ -153,11 +152,10 @@ class Edits(NodeCase):
             moved = self.states_after(state, 1)
         moved = self.states_after(state, 100)
         self.assertAlmostEqual(moved.nodes[10].y, held.nodes[10].y + 0.12, delta=1e-3)
-        wait_until(lambda: wrench.last().header.stamp == moved.header.stamp, what="its wrench")
-        force = wrench.last().wrench.force
+        force = wrench.at(moved.header.stamp).wrench.force
         self.assertGreater(math.sqrt(force.x ** 2 + force.y ** 2 + force.z ** 2), 0.01)
-        self.assertEqual(wrench.last().header.frame_id, "t/rod/grasps/hand")
-        self.assertEqual(grasps.last().name, ["left", "right", "hand"])
+        self.assertEqual(wrench.at(moved.header.stamp).header.frame_id, "t/rod/grasps/hand")
+        self.assertEqual(grasps.at(moved.header.stamp).name, ["left", "right", "hand"])
         self.done("detach", "hand")
         wait_until(lambda: guide.get_num_connections() == 0, what="the end of its topic")
         wait_until(lambda: not self.published("/t/grasps/hand/wrench"), what="the end of its wrench")
@@ -304,9 +302,7 @@ class Edits(NodeCase):
         self.done("spawn", SECOND)
         rods, cloths = self.listen("/t/rods/state", RodState), self.listen("/t/cloths/state", ClothState)
         end = self.step(10).stamp
-        wait_until(lambda: rods.last().header.stamp == end and cloths.last().header.stamp == end,
-                   what="states of both kinds")
-        self.assertEqual((rods.last().step, rods.last().name, cloths.last().names), (20, "rope", ["second"]))
+        self.assertEqual((rods.at(end).step, rods.at(end).name, cloths.at(end).names), (20, "rope", ["second"]))
         self.assertFalse(self.published("/t/state"))
         self.refused("remove", "rope", "which rod_node is for")
         self.done("remove", "second")
@@ -322,13 +318,11 @@ class Edits(NodeCase):
         flow.publish(0.0)
         self.arrived()
         self.states_after(state, 20)
-        stopped = sum(edge.z for edge in state.last().nodes)
         self.done("spawn", "threads: [{name: glue, nozzle: {position: [0.1, 0, 0.03], diameter: 0.005, flow: 6.0e-7}}]")
         nozzle = self.listen("/t/threads/honey/nozzle/wrench", WrenchStamped)
-        self.step(20)
+        stamp = self.step(20).stamp
         wait_until(lambda: nozzle.count() >= 20, what="wrenches on the first nozzle, under its new name")
-        last = [m for m in state.all() if m.header.stamp == state.last().header.stamp]
-        self.assertEqual({m.name for m in last}, {"honey", "glue"})
+        self.assertEqual({m.name for m in state.all_at(stamp, 2)}, {"honey", "glue"})
         honey = [m for m in state.all() if m.name == "honey"]
         self.assertEqual(len(honey[-1].nodes), len(honey[-20].nodes))   # its flow is still that of the message
         self.assertFalse(self.published("/t/nozzle/wrench"))

@@ -60,7 +60,7 @@ class Fairing(NodeCase):
     def setUp(self):
         NodeCase.setUp(self)
         self.launch("fairing_node", "fairing", {})
-        rospy.wait_for_service("/t/fairing/fair_mesh", 20)
+        rospy.wait_for_service("/t/fairing/fair_mesh", 60)
         self.fair = rospy.ServiceProxy("/t/fairing/fair_mesh", FairMesh)
 
     def test_smooths_a_noisy_sphere(self):

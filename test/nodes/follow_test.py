@@ -52,7 +52,8 @@ class Follow(NodeCase):
 
     def follow(self, *options):
         rospy.set_param("/use_sim_time", True)
-        self.start(wait=False, pace="follow", guide_delay=DELAY, record_bag=self.path("run.bag"))
+        self.start(wait=False, pace="follow", guide_delay=DELAY, guide_timeout=2 * DELAY,
+                   record_bag=self.path("run.bag"))
         clock = self.publisher("/clock", Clock)   # the node subscribes and advertises when it has heard the clock
         # States are taken from the node's own bag, which misses none. What is heard live are its reports, twenty a
         # second.
@@ -65,7 +66,10 @@ class Follow(NodeCase):
         wait_until(heard, what="the node to hear the clock")
         player = self.play(*options)
         self.assertEqual(player.wait(100), 0, self.output("play.out"))
-        wait_until(lambda: self.simulated > LENGTH - 0.05, what="the end of the bag")
+        def at_end():
+            clock.publish(Clock(rospy.Time.from_sec(BEGIN + LENGTH)))   # that of the player may end with it, unsent
+            return self.simulated > LENGTH - 0.05
+        wait_until(at_end, what="the end of the bag")
         node = self.processes[0]
         node.terminate()
         self.assertEqual(node.wait(60), 0)

@@ -1,4 +1,6 @@
 """Drags the handles of ~interactive as rviz does: what the tests of several nodes share."""
+import math
+
 from visualization_msgs.msg import InteractiveMarkerFeedback, InteractiveMarkerInit
 
 from node_harness import NodeCase, fill, wait_until
@@ -27,8 +29,15 @@ class HandCase(NodeCase):
         self.arrived()
 
     def drag_by(self, name, dx, dy, dz, **keywords):
-        """From where the handle is, without turning it."""
-        self.drag(name, *self.beside(name, dx, dy, dz), **keywords)
+        """From where the handle is, without turning it. Waits until the handle is shown where the hand is, of which the
+        server of the handles hears by itself."""
+        place, q = self.beside(name, dx, dy, dz)
+        self.drag(name, place, q, **keywords)
+
+        def shown():
+            p = self.handles()[name].pose.position
+            return math.dist((p.x, p.y, p.z), place) < 1e-9
+        wait_until(shown, what="the handle where the hand is")
 
     def beside(self, name, dx, dy, dz):
         wait_until(lambda: self.shown.count() and name in self.handles(), what="the handle " + name)

@@ -78,9 +78,8 @@ class Hand(HandCase):
         self.begin(BODIES)
         bodies = self.listen("/t/body_states", BodyStates)
         self.drag("bodies/paddle", (0.2, 1.0, 0.3), q=(0, 0, math.sin(0.25), math.cos(0.25)))
-        self.after(120)
-        wait_until(lambda: bodies.last().header.stamp == self.states.last().header.stamp, what="the bodies of that state")
-        paddle = bodies.last().pose[bodies.last().name.index("paddle")]
+        told = bodies.at(self.after(120).header.stamp)
+        paddle = told.pose[told.name.index("paddle")]
         self.assertAlmostEqual(paddle.position.x, 0.2, delta=1e-6)
         self.assertAlmostEqual(paddle.position.z, 0.3, delta=1e-6)
         self.assertAlmostEqual(paddle.orientation.z, math.sin(0.25), delta=1e-6)

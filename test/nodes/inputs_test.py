@@ -125,7 +125,7 @@ class Inputs(NodeCase):
         return message
 
     def test_guide_in_another_frame(self):
-        self.start(SCENE.replace(", attach: initial", ""), tf_timeout=10.0)
+        self.start(SCENE.replace(", attach: initial", ""), tf_timeout=60.0)
         state = self.listen("/t/state", RodState)
         guide = self.publisher(RIGHT, PoseStamped)
         tf = self.publisher("/tf", TFMessage)
@@ -190,7 +190,8 @@ class Inputs(NodeCase):
             for k in range(21):
                 s = k / 20.0
                 file.write("%g,hand,3,2,%.6f,0,0,0,1\n" % (s, 0.1 * s * s * (3 - 2 * s)))
-        self.start(pace="wall", guide_delay=1.0)   # a busy machine may keep messages for a while
+        # a busy machine may keep messages for a while
+        self.start(pace="wall", guide_delay=3.0, guide_timeout=10.0, tf_timeout=10.0)
         state = self.listen("/t/state", RodState)
         player = self.launch("motion_player", "player", {"file": table, "bodies": {"hand": "right"}})
         self.assertEqual(player.wait(100), 0, self.output("player.err"))

@@ -54,7 +54,7 @@ class Knot(unittest.TestCase):
 
     def test_the_knot_holds(self):
         states = Listener("state", RodState)
-        wait_until(lambda: states.last().step * STEP > 2.0, 90, "two seconds of the knot")
+        wait_until(lambda: states.last().step * STEP > 2.0, 400, "two seconds of the knot")
         last = states.last()
         self.assertGreater(abs(writhe(points_of(last))), 2.0)
         seen = states.all()

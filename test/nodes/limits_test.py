@@ -1,8 +1,7 @@
 #!/usr/bin/python3
 """Key `limits` of scenes, with messages: what the node says, and each `on_limit`."""
 import rosbag
-import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from node_harness import SCENE, NodeCase, pose, run, wait_until
 from slender_sim.msg import GraspStates, RodState
@@ -17,7 +16,8 @@ LIMITED = SCENE + "limits: {strain: 0.2, on_limit: %s}\n"
 class Limits(NodeCase):
 
     def begin(self, on_limit, **parameters):
-        self.start(LIMITED % on_limit, guide_delay=0.05, record_bag=self.path("run.bag"), **parameters)
+        self.start(LIMITED % on_limit, guide_delay=0.05, diagnostics_rate=1000.0, record_bag=self.path("run.bag"),
+                   **parameters)
         self.state, self.grasps = self.listen("/t/state", RodState), self.listen("/t/grasp_states", GraspStates)
         self.guide = self.publisher(RIGHT, PoseStamped)
         self.time, self.x = 1.0, 1.0
@@ -27,17 +27,19 @@ class Limits(NodeCase):
         """The gripper goes to x meanwhile, at 100 Hz. Returns the last state, or why a step was refused."""
         samples = int(round(seconds / 0.01))
         way = (x - self.x) / samples
-        for _ in range(samples):
-            self.x += way
-            self.time += 0.01
-            self.guide.publish(pose(self.x, 0, 1, self.time))
-            rospy.sleep(0.003)   # for the message's way; one that comes later counts with the next step
-            answer = self.call("step", Step, 2)
-            if not answer.success:
-                return answer.message
-        wait_until(lambda: self.state.count() > 0 and self.state.last().header.stamp >= answer.stamp,
-                   what="the last state")
-        return self.state.last()
+        reports = self.listen("/diagnostics", DiagnosticArray)
+        try:
+            for _ in range(samples):
+                self.x += way
+                self.time += 0.01
+                self.guide.publish(pose(self.x, 0, 1, self.time))
+                self.arrived(reports)
+                answer = self.call("step", Step, 2)
+                if not answer.success:
+                    return answer.message
+        finally:
+            reports.subscriber.unregister()   # so that diagnostics() connects anew
+        return self.state.at(answer.stamp)
 
     def warnings(self):
         return self.output("rod.out") + self.output("rod.err")
@@ -93,9 +95,9 @@ class Limits(NodeCase):
 
     def test_release_lets_go_and_is_recorded(self):
         self.begin("release")
-        self.follow(1.4, 0.8)
+        stamp = self.follow(1.4, 0.8).header.stamp
         self.assertIn("is released, because a limit is exceeded", self.warnings())
-        self.assertIn(False, [bool(a) for a in self.grasps.last().active])
+        self.assertIn(False, [bool(a) for a in self.grasps.at(stamp).active])
         self.replayed()
         with rosbag.Bag(self.path("run.bag")) as bag:
             kinds = [message.kind for _, message, _ in bag.read_messages(topics=["/t/inputs"])
@@ -108,6 +110,7 @@ class Limits(NodeCase):
         self.assertIn("a limit is exceeded (on_limit: stop): rod 'rope', edge ", message)
         self.assertEqual(self.diagnostics("simulation")["level"], DiagnosticStatus.ERROR)
         self.assertTrue(self.call("reset", Trigger).success)
+        wait_until(lambda: self.state.last().epoch == 1, what="the state after the reset")
         self.x = 1.0
         self.time = self.state.last().header.stamp.to_sec() - 0.005
         state = self.follow(1.1, 0.4)

@@ -6,11 +6,13 @@ import tempfile
 import threading
 import time
 import unittest
+import xmlrpc.client
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
-from slender_sim.srv import Step
+from slender_sim.srv import FilePath, Step
 
 SCENE = """
 name: test_rope
@@ -40,8 +42,25 @@ def find_program(name):
     raise RuntimeError("%s is not built" % name)
 
 
+def others(topic, part):
+    """Nodes, other than this one, that publish (part 0) or hear (part 1) a topic."""
+    nodes = dict(rosgraph.Master(rospy.get_name()).getSystemState()[part]).get(topic, [])
+    return [node for node in nodes if node != rospy.get_name()]
+
+
+def address_of(node):
+    return rosgraph.Master(rospy.get_name()).lookupNode(node)
+
+
+def sends(node, topic, receiver):
+    """True if a node sends a topic to another node, which gets what is published from now on."""
+    links = xmlrpc.client.ServerProxy(address_of(node)).getBusInfo(rospy.get_name())[2]
+    return any((link[1], link[2], link[4]) == (receiver, "o", topic) for link in links)
+
+
 class Listener:
-    """Collects every message of a topic."""
+    """Collects every message of a topic. What was sent at the same time on another topic, or as the answer of a
+    service, may come sooner or later: take what belongs to an instant with at()."""
 
     def __init__(self, topic, kind):
         self.messages = []
@@ -66,8 +85,29 @@ class Listener:
         with self.lock:
             return self.messages[-1]
 
+    def all_at(self, stamp, count=1):
+        """The messages with this stamp. Waits until there are so many."""
+        def found():
+            return [message for message in self.all() if message.header.stamp == stamp]
+        wait_until(lambda: len(found()) >= count, what="%d messages of %s at %s" % (count, self.subscriber.name, stamp))
+        return found()
+
+    def at(self, stamp):
+        """The message with this stamp. Waits for it."""
+        return self.all_at(stamp)[0]
+
     def connected(self):
-        return self.subscriber.get_num_connections() > 0
+        """True if somebody publishes the topic, and if what all its publishers send from now on comes here. Both ends
+        must know of a connection: rospy counts those that nobody has answered yet, a node those that have just ended.
+        """
+        topic = self.subscriber.resolved_name
+        answered = [connection.endpoint_id for connection in self.subscriber.impl.connections if connection.header]
+        try:
+            nodes = others(topic, 0)
+            return bool(nodes) and all(address_of(node) in answered and sends(node, topic, rospy.get_name())
+                                       for node in nodes)
+        except (OSError, rosgraph.MasterException, xmlrpc.client.Error):
+            return False   # a publisher has just gone
 
 
 class Publisher(rospy.Publisher):
@@ -81,6 +121,11 @@ class Publisher(rospy.Publisher):
         rospy.Publisher.publish(self, *arguments, **keywords)
         self.sent += 1
 
+    def connected(self):
+        """True if somebody hears the topic, and if everybody who does gets what is sent from now on."""
+        nodes = set(others(self.resolved_name, 1))
+        return bool(nodes) and nodes <= {connection.endpoint_id for connection in self.impl.connections}
+
 
 def wait_until(condition, timeout=60.0, what="condition"):
     """The time runs out on failures only: a busy machine may take its time."""
@@ -90,6 +135,16 @@ def wait_until(condition, timeout=60.0, what="condition"):
             return
         time.sleep(0.01)
     raise AssertionError("timed out waiting for " + what)
+
+
+def status_of(report, kind):
+    """Values of the node's status `simulation` or `inputs` in a message of /diagnostics, with `level` and `message`."""
+    for status in report.status:
+        if status.name == "/t/rod: " + kind:
+            values = {value.key: value.value for value in status.values}
+            values.update(level=status.level, message=status.message)
+            return values
+    raise AssertionError("no status " + kind)
 
 
 class NodeCase(unittest.TestCase):
@@ -138,8 +193,11 @@ class NodeCase(unittest.TestCase):
             def up():
                 self.assertIsNone(process.poll(), self.output("rod.err"))
                 try:
-                    rospy.wait_for_service("/t/rod/load_state", 1)
-                except rospy.ROSException:
+                    rospy.wait_for_service("/t/rod/save_state", 1)
+                    # It is refused without a path. Only a node that has published its first state and offers all its
+                    # services answers.
+                    self.call("save_state", FilePath, "")
+                except (rospy.ROSException, rospy.ServiceException):
                     return False
                 return True
             wait_until(up, what="the node's services")
@@ -150,23 +208,26 @@ class NodeCase(unittest.TestCase):
             return file.read()
 
     def listen(self, topic, kind):
-        """Subscribes and waits for the connection."""
+        """Subscribes and waits for the connection: what is published after this call is heard."""
         listener = Listener(topic, kind)
         self.ends.append(listener.subscriber)
         wait_until(listener.connected, what="a publisher of " + topic)
-        rospy.sleep(0.2)   # the publisher knows of it a little later
         return listener
 
     def publisher(self, topic, kind):
         publisher = Publisher(topic, kind)
         self.ends.append(publisher)
-        wait_until(lambda: publisher.get_num_connections() > 0, what="a subscriber of " + topic)
+        wait_until(publisher.connected, what="a subscriber of " + topic)
         return publisher
 
-    def arrived(self):
-        """Waits until the node has received all that was sent to it in its namespace."""
+    def arrived(self, reports=None):
+        """Waits until the node has received all that was sent to it in its namespace. With `reports`, which listens to
+        /diagnostics, that is quicker."""
         sent = sum(end.sent for end in self.ends if isinstance(end, Publisher) and end.resolved_name.startswith("/t/"))
-        wait_until(lambda: int(self.diagnostics("inputs")["received"]) >= sent, what="%d messages to arrive" % sent)
+
+        def received():
+            return int((status_of(reports.last(), "inputs") if reports else self.diagnostics("inputs"))["received"])
+        wait_until(lambda: received() >= sent, what="%d messages to arrive" % sent)
 
     def call(self, name, kind, *arguments):
         proxy = rospy.ServiceProxy("/t/rod/" + name, kind)
@@ -178,20 +239,14 @@ class NodeCase(unittest.TestCase):
         return answer
 
     def states_after(self, listener, n):
-        """Steps n times and returns the last state."""
-        stamp = self.step(n).stamp
-        wait_until(lambda: listener.last().header.stamp >= stamp, what="the state at %s" % stamp)
-        return listener.last()
+        """Steps n times and returns the last state: of several objects, that of the first one."""
+        return listener.at(self.step(n).stamp)
 
     def diagnostics(self, kind):
-        """Values of the node's latest status `simulation` or `inputs`, with `level` and `message`."""
-        message = rospy.wait_for_message("/diagnostics", DiagnosticArray, 60)
-        for status in message.status:
-            if status.name == "/t/rod: " + kind:
-                values = {value.key: value.value for value in status.values}
-                values.update(level=status.level, message=status.message)
-                return values
-        raise AssertionError("no status " + kind)
+        """Values of the next status `simulation` or `inputs` that the node sends after this call. It connects anew and
+        misses reports meanwhile: what is counted since the last report needs a listener. While one listens to
+        /diagnostics, the status may be older than the call."""
+        return status_of(rospy.wait_for_message("/diagnostics", DiagnosticArray, 60), kind)
 
     def dropped(self, reason):
         return int(self.diagnostics("inputs")["dropped " + reason])

@@ -15,7 +15,7 @@ class NodeletsLaunch(unittest.TestCase):
     def test_shell_follows_the_cloth(self):
         shell = Listener("/state", ClothState)
         cloth = Listener("/coarse/state", ClothState)
-        wait_until(lambda: shell.count() > 300 and cloth.count() > 300, what="states of both")
+        wait_until(lambda: shell.count() > 300 and cloth.count() > 300, 240, "states of both")
         self.assertEqual((shell.last().names, cloth.last().names), (["fine"], ["coarse"]))
 
         def follows():
@@ -34,7 +34,8 @@ class NodeletsLaunch(unittest.TestCase):
         self.assertTrue(names & {"/coarse: simulation", "/fine: simulation"}, names)
 
     def test_unload_and_load(self):
-        rospy.wait_for_service("/simulation/load_nodelet", 20)
+        for service in ("load_nodelet", "unload_nodelet", "list"):
+            rospy.wait_for_service("/simulation/" + service, 60)
         load = rospy.ServiceProxy("/simulation/load_nodelet", NodeletLoad)
         unload = rospy.ServiceProxy("/simulation/unload_nodelet", NodeletUnload)
         loaded = rospy.ServiceProxy("/simulation/list", NodeletList)

@@ -3,12 +3,13 @@
 import math
 
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from slender_sim.msg import BodyStates, GraspStates
 from slender_sim.srv import FilePath
 from std_srvs.srv import Trigger
 
-from node_harness import SCENE, NodeCase, fill, pose, run, wait_until
+from node_harness import SCENE, NodeCase, fill, pose, run
 
 RIGHT = "/t/grasps/right/pose"
 GIVEN = SCENE.replace("attach: initial", "offset: {position: [0.05, 0, 0.1]}")
@@ -26,17 +27,17 @@ class Offsets(NodeCase):
         self.start(scene, guide_delay=0.05)
         self.grasps = self.listen("/t/grasp_states", GraspStates)
         self.gripper = self.publisher(RIGHT, PoseStamped)
+        self.reports = self.listen("/diagnostics", DiagnosticArray)
         self.stamp = 1.0
 
     def stream(self, place, seconds=0.6):
         """Holds the gripper at a place and sends its poses at 50 Hz. Returns the position of the end of the rope."""
         for _ in range(int(50 * seconds)):
             self.gripper.publish(pose(*place, self.stamp))
-            self.arrived()
+            self.arrived(self.reports)
             stamp = self.step(4).stamp
             self.stamp += 0.02
-        wait_until(lambda: self.grasps.count() and self.grasps.last().header.stamp >= stamp, what="the grasps")
-        p = self.grasps.last().pose[1].position
+        p = self.grasps.at(stamp).pose[1].position
         return p.x, p.y, p.z
 
     def assert_at(self, place, expected):
@@ -76,9 +77,7 @@ class Offsets(NodeCase):
         message.name, message.pose = ["hand"], [fill(pose(0, 0, 0).pose, AWAY)]
         hand.publish(message)
         self.arrived()
-        stamp = self.step(200).stamp
-        wait_until(lambda: grasps.last().header.stamp >= stamp, what="the grasps")
-        p = grasps.last().pose[1].position
+        p = grasps.at(self.step(200).stamp).pose[1].position
         self.assert_at((p.x, p.y, p.z), end_at(AWAY))
 
 

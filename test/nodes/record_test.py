@@ -9,7 +9,7 @@ import rosbag
 import rosgraph
 import rospkg
 
-from node_harness import run, wait_until
+from node_harness import run, sends, wait_until
 
 BAGS = os.path.join(rospkg.get_ros_home(), "slender_sim_record_test_*.bag")
 
@@ -29,6 +29,8 @@ class Record(unittest.TestCase):
             return [topic for topic, nodes in subscribers if "/bag_recorder" in nodes]
 
         wait_until(lambda: {"/state", "/scene"} <= set(topics()), what="the recorder")
+        wait_until(lambda: all(sends("/rod_node", topic, "/bag_recorder") for topic in ("/state", "/scene")),
+                   what="its connections")
         before = recorded()
         wait_until(lambda: recorded() > before + 1000000, what="states in the bag")   # some 10 kB each
         subprocess.run(["rosnode", "kill", "/bag_recorder"], stdout=subprocess.DEVNULL, check=True)

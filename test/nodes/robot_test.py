@@ -6,11 +6,12 @@ import subprocess
 
 import rosbag
 import rospy
-import tf2_ros
 from geometry_msgs.msg import TransformStamped
-from node_harness import Listener, NodeCase, run, wait_until
+from node_harness import NodeCase, run, wait_until
 from sensor_msgs.msg import JointState
 from slender_sim.msg import BodyStates
+from slender_sim.srv import SetGrasp
+from tf2_msgs.msg import TFMessage
 
 URDF = """<robot name="arm">
   <link name="base"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
@@ -30,7 +31,7 @@ rods:
     contact: {}
     grasps: {end: {edges: [0]}}
 """
-DELAY = 0.1
+DELAY = 1.0   # [s] by which a busy machine may keep a transform from the node
 
 
 def commanded(t):
@@ -53,8 +54,8 @@ class Robot(NodeCase):
             message.transform.translation.z = z
             message.transform.rotation.y, message.transform.rotation.w = math.sin(turn / 2), math.cos(turn / 2)
             return message
-        self.broadcaster.sendTransform([transform("world", "left/base", 0, 0),
-                                        transform("left/base", "left/arm", 0.5, angle)])
+        self.tf.publish(TFMessage([transform("world", "left/base", 0, 0),
+                                   transform("left/base", "left/arm", 0.5, angle)]))
 
     def move(self, seconds):
         rate, begin = rospy.Rate(100), rospy.get_time()
@@ -65,15 +66,18 @@ class Robot(NodeCase):
 
     def run_beside_arm(self, **parameters):
         rospy.set_param("/robot_description", URDF)
-        self.broadcaster = tf2_ros.TransformBroadcaster()
-        return self.start(SCENE, pace="wall", guide_delay=DELAY, **parameters)
+        node = self.start(SCENE, pace="wall", guide_delay=DELAY, guide_timeout=5 * DELAY, **parameters)
+        self.tf = self.publisher("/tf", TFMessage)
+        return node
 
     def test_links_follow_tf_with_one_lag(self):
         self.run_beside_arm()
         obstacles = self.listen("/t/obstacle_states", BodyStates)
         self.start_of_motion = rospy.get_time() + 1.5
-        self.move(5.0)
-        states = [m for m in obstacles.all() if m.header.stamp.to_sec() > self.start_of_motion - 0.5]
+        self.move(5.0 + DELAY)
+        end = rospy.Time.now()
+        wait_until(lambda: obstacles.last().header.stamp >= end, what="a state of the end of the motion")
+        states = [m for m in obstacles.all() if self.start_of_motion - 0.5 < m.header.stamp.to_sec() <= end.to_sec()]
         self.assertGreater(len(states), 200)
         worst, farthest = 0.0, 0.0
         for message in states:
@@ -89,7 +93,7 @@ class Robot(NodeCase):
     def test_a_bag_holds_the_robot(self):
         node = self.run_beside_arm(record_bag=self.path("run.bag"))
         self.start_of_motion = rospy.get_time() + 0.3
-        self.move(2.0)
+        self.move(2.0 + DELAY)
         node.terminate()
         self.assertEqual(node.wait(60), 0, self.output("rod.err"))
         rospy.delete_param("/robot_description")
@@ -136,10 +140,11 @@ class Robot(NodeCase):
         script = os.path.join(os.path.dirname(os.path.realpath(__file__)), "../../scripts/joint_motion")
         with open(self.path("joints.csv"), "w") as file:
             file.write("# a ramp\nt,a,b\n0,0,1\n1,2,1\n2,4,1\n")
-        states = Listener("/t/joint_states", JointState)
-        self.ends.append(states.subscriber)
-        self.processes.append(subprocess.Popen(["/usr/bin/python3", script, "__ns:=/t",
+        self.processes.append(subprocess.Popen(["/usr/bin/python3", script, "__ns:=/t", "_node:=/t/gate",
                                                 "_file:=" + self.path("joints.csv")]))
+        states = self.listen("/t/joint_states", JointState)
+        gate = rospy.Service("/t/gate/set_grasp", SetGrasp, lambda request: None)   # the motion waits for it
+        self.addCleanup(gate.shutdown)
         wait_until(lambda: states.count() > 0 and abs(states.last().position[0] - 4) < 1e-9,
                    what="the end of the table")
         self.assertEqual(states.last().name, ["a", "b"])

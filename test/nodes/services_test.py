@@ -8,7 +8,7 @@ import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, PoseStamped, WrenchStamped
-from node_harness import SCENE, NodeCase, numbers, pose, run, wait_until
+from node_harness import SCENE, NodeCase, numbers, pose, run, status_of, wait_until
 from rosgraph_msgs.msg import Clock
 from slender_sim.msg import RodState
 from slender_sim.srv import FilePath, SetGrasp, SetGraspRequest, Step
@@ -37,7 +37,8 @@ class Services(NodeCase):
         state = self.listen("/t/state", RodState)
         wait_until(lambda: state.count() > 10, what="states")
         self.assertTrue(self.call("pause", SetBool, True).success)
-        rospy.sleep(0.2)
+        step = int(self.diagnostics("simulation")["step"])
+        wait_until(lambda: state.last().step == step, what="the last state before the pause")
         held = state.last()
         count = state.count()
         rospy.sleep(0.5)
@@ -135,7 +136,7 @@ class Services(NodeCase):
         self.assertIn("grasp left", self.set_grasp("right", nodes, 0, 2).message)
         fallen = self.states_after(state, 60)
         self.assertLess(fallen.nodes[-1].z, 0.8)
-        force = wrench.last().wrench.force
+        force = wrench.at(fallen.header.stamp).wrench.force
         self.assertEqual((force.x, force.y, force.z), (0, 0, 0))
         for bad in ((nodes, -1, 3), (nodes, 5, 21), (nodes, -22, 0), (nodes, 0, 2), (9, 0, 0)):
             answer = self.set_grasp("right", *bad)
@@ -204,12 +205,12 @@ class Services(NodeCase):
     def test_tells_of_itself_during_a_long_step(self):
         self.start()
         told = self.listen("/diagnostics", DiagnosticArray)
-        before = told.count()
         self.step(30000)   # about a second
-        wait_until(lambda: told.count() > before, what="diagnostics")
-        steps = [int(value.value) for message in told.all()[before:] for status in message.status for value in status.values
-                 if value.key == "step"]
-        self.assertTrue([s for s in steps if 0 < s < 30000], steps)
+
+        def steps():
+            return [int(status_of(report, "simulation")["step"]) for report in told.all()]
+        wait_until(lambda: 30000 in steps(), what="diagnostics of the end")
+        self.assertTrue([s for s in steps() if 0 < s < 30000], steps())
 
     def test_tells_of_the_equilibrium_from_which_it_starts(self):
         node = self.start()
@@ -303,9 +304,7 @@ class Services(NodeCase):
         try:
             self.refused("use_sim_time", pace="wall")
             self.start(wait=False, pace="follow")
-            clock = rospy.Publisher("/clock", Clock, queue_size=100)
-            wait_until(lambda: clock.get_num_connections() > 0, what="the node to listen to /clock")
-            rospy.sleep(0.2)
+            clock = self.publisher("/clock", Clock)
             clock.publish(Clock(rospy.Time.from_sec(5.0)))
             state = self.listen("/t/state", RodState)
             clock.publish(Clock(rospy.Time.from_sec(5.0)))

@@ -144,13 +144,13 @@ class Signals(NodeCase):
             for x in range(n - 1):
                 a = y * n + x
                 request.triangles += [a, a + 1, a + n, a + 1, a + n + 1, a + n]
+        with open(self.path("request"), "wb") as file:
+            request.serialize(file)
         for which in (signal.SIGINT, signal.SIGTERM):
             process = self.launch("fairing_node", "fairing", {})
             rospy.wait_for_service("/t/fairing/fair_mesh", 60)
             caller = subprocess.Popen(["/usr/bin/python3", "-c", CALL, self.path("request")], stdout=subprocess.PIPE)
             self.processes.append(caller)
-            with open(self.path("request"), "wb") as file:
-                request.serialize(file)
             self.assertEqual(caller.stdout.readline(), b"called\n")
             rospy.sleep(1.0)
             self.expect_end(process, "fairing", which)
@@ -158,11 +158,8 @@ class Signals(NodeCase):
 
 
 CALL = """
-import os, sys, time, rospy
+import sys, rospy
 from slender_sim.srv import FairMesh, FairMeshRequest
-while not os.path.exists(sys.argv[1]) or os.path.getsize(sys.argv[1]) == 0:
-    time.sleep(0.01)
-time.sleep(0.5)
 request = FairMeshRequest().deserialize(open(sys.argv[1], "rb").read())
 proxy = rospy.ServiceProxy("/t/fairing/fair_mesh", FairMesh)
 print("called", flush=True)

@@ -4,13 +4,14 @@ import math
 
 import rosbag
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rosgraph_msgs.msg import Log
 from slender_sim.msg import BodyStates, ClothState, GraspStates, RodState, ThreadState
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
-from node_harness import NodeCase, numbers, pose, run, wait_until
+from node_harness import NodeCase, numbers, pose, run, status_of, wait_until
 
 SCENE = """
 name: beside_a_robot
@@ -67,10 +68,7 @@ class Tf(NodeCase):
 
     def now(self, stamp):
         """Grasp, link, table and cart at the same instant."""
-        for listener in (self.obstacles, self.grasps, self.bodies):
-            wait_until(lambda: listener.last().header.stamp >= stamp, what="states")
-        obstacles, grasps, bodies = ([m for m in listener.all() if m.header.stamp == stamp][0]
-                                     for listener in (self.obstacles, self.grasps, self.bodies))
+        obstacles, grasps, bodies = [listener.at(stamp) for listener in (self.obstacles, self.grasps, self.bodies)]
         return place(grasps.pose[1]), place(obstacles.pose[0]), place(obstacles.pose[1]), place(bodies.pose[0])
 
     def heard(self, *frames):
@@ -91,8 +89,9 @@ class Tf(NodeCase):
         c, s = math.cos(0.3), math.sin(0.3)
         def in_base(p):
             return c * p[0] + s * p[1], -s * p[0] + c * p[1], p[2]
-        messages = [transform("base", "tool0", in_base(swing(0.02 * k)), 1 + 0.02 * k, turn=-0.3) for k in range(700)]
-        messages += [transform("world", "base", (0, 0, 0), 1 + 0.02 * k, turn=0.3) for k in range(700)]
+        instants = range(450)   # nine seconds: tf forgets what is older than ten
+        messages = [transform("base", "tool0", in_base(swing(0.02 * k)), 1 + 0.02 * k, turn=-0.3) for k in instants]
+        messages += [transform("world", "base", (0, 0, 0), 1 + 0.02 * k, turn=0.3) for k in instants]
         self.tf.publish(TFMessage(messages))
         self.heard("tool0")
         self.step(40)   # what was late at the start has caught up
@@ -113,11 +112,26 @@ class Tf(NodeCase):
         """slow comes 0.15 s after its stamps, tool0 and the messages in time: all are shown at one instant."""
         self.follow(guide_delay=0.05, pace="wall")
         left = self.publisher("/t/grasps/left/pose", PoseStamped)
+        reports = self.listen("/diagnostics", DiagnosticArray)
         start = rospy.get_time()
         rate = rospy.Rate(50)
         late = []
         way = lambda t: 0.03 * math.sin(2 * t)
-        for _ in range(300):
+
+        def lags():
+            values = status_of(reports.last(), "inputs")
+            return [float(values["input lag %s [s]" % key]) for key in ("left", "right (tf tool0)", "cart (tf slow)")]
+
+        def gaps():
+            """How far the others are from the cart, in the last second."""
+            last = [{message.header.stamp: message.pose for message in listener.all()[-200:]}
+                    for listener in (self.grasps, self.obstacles, self.bodies)]
+            common = [[poses[stamp] for poses in last] for stamp in last[0] if stamp in last[1] and stamp in last[2]]
+            return [max(abs(x - bodies[0].position.x)
+                        for x in (grasps[0].position.x, grasps[1].position.x - 1, obstacles[0].position.x - 1))
+                    for grasps, obstacles, bodies in common]
+
+        for k in range(3000):
             now = rospy.get_time()
             late.append(now)
             left.publish(pose(way(now - start), 0, 1, now))
@@ -126,22 +140,16 @@ class Tf(NodeCase):
                 then = late.pop(0)
                 self.tf.publish(TFMessage([transform("world", "slow", (way(then - start), 7, 0), then)]))
             rate.sleep()
-        values = self.diagnostics("inputs")
-        lags = {key: float(values["input lag %s [s]" % key]) for key in ("left", "right (tf tool0)", "cart (tf slow)")}
-        self.assertGreater(lags["left"], 0.15)
-        self.assertLess(max(lags.values()) - min(lags.values()), 5e-3, lags)   # they approach it
-        grasps, obstacles, bodies = {}, {}, {}
-        for listener, out in ((self.grasps, grasps), (self.obstacles, obstacles), (self.bodies, bodies)):
-            for message in listener.all()[-200:]:
-                out[message.header.stamp] = message
-        common = [stamp for stamp in grasps if stamp in obstacles and stamp in bodies]
-        self.assertGreater(len(common), 50)
-        for stamp in common:
-            cart = bodies[stamp].pose[0].position.x
-            # in 0.1 s, by which one is later than the other, they move by up to 6 mm
-            self.assertLess(abs(grasps[stamp].pose[0].position.x - cart), 5e-4)
-            self.assertLess(abs(grasps[stamp].pose[1].position.x - 1 - cart), 5e-4)
-            self.assertLess(abs(obstacles[stamp].pose[0].position.x - 1 - cart), 5e-4)
+            if k < 299 or k % 20 != 19:
+                continue
+            lag, gap = lags(), gaps()
+            if max(lag) - min(lag) < 5e-3 and max(gap, default=1.0) < 5e-4:
+                break   # after six seconds; later if the machine was busy, so that other inputs came late as well
+        self.assertGreater(lag[0], 0.15)
+        self.assertLess(max(lag) - min(lag), 5e-3, lag)   # they approach it
+        self.assertGreater(len(gap), 50)
+        # in 0.1 s, by which one is later than the other, they move by up to 6 mm
+        self.assertLess(max(gap), 5e-4)
 
     def test_static_frames(self):
         self.follow(guide_delay=0.05)

@@ -2,7 +2,6 @@
 """thread_node: nozzle, flow and belt by message; ids of nodes that are fed, divided and dropped; bad values."""
 import math
 
-import rospy
 from geometry_msgs.msg import PoseStamped, Vector3Stamped, WrenchStamped
 from std_msgs.msg import Float64
 from slender_sim.msg import ThreadState
@@ -75,7 +74,7 @@ class Thread(NodeCase):
         moved = self.after(60)
         self.assertAlmostEqual(moved.nodes[-1].x, 0.02, delta=1e-6)
         self.assertLess(max(abs(p.y) for p in moved.nodes), 0.01)
-        self.assertLess(wrenches.last().wrench.force.z, 0.0)           # hangs on the nozzle
+        self.assertLess(wrenches.at(moved.header.stamp).wrench.force.z, 0.0)   # hangs on the nozzle
         nozzle.publish(pose(0.02, 0, float("nan"), stamp=5.0))
         self.expect_drop("not_finite")
         nozzle.publish(pose(0.02, 0, HEIGHT, stamp=1.4, q=(0, 0, 0, 3)))
@@ -140,21 +139,21 @@ class Thread(NodeCase):
         self.begin()
         wrenches = self.listen("/t/nozzle/wrench", WrenchStamped)
 
-        def next_wrench(act):
-            before = -1
-            while before != wrenches.count():   # those of earlier steps may still be on their way
-                before = wrenches.count()
-                rospy.sleep(0.3)
-            act()
-            wait_until(lambda: wrenches.count() > before, what="a wrench")
-            return wrenches.last().wrench.force.z
-        saved = next_wrench(lambda: self.step(1))
+        def wrench_with(state):
+            return wrenches.at(state.header.stamp).wrench.force.z
+
+        def first_of(epoch):
+            wait_until(lambda: self.states.last().epoch == epoch, what="the state of epoch %d" % epoch)
+            return self.states.last()
+        saved = wrench_with(self.after(1))
         self.assertTrue(self.call("save_state", FilePath, self.path("state")).success)
-        later = [numbers(self.after(1)) for _ in range(50)]
-        self.assertNotEqual(wrenches.last().wrench.force.z, saved)
-        self.assertEqual(next_wrench(lambda: self.call("load_state", FilePath, self.path("state"))), saved)
-        self.assertEqual([numbers(self.after(1)) for _ in range(50)], later)
-        self.assertEqual(next_wrench(lambda: self.call("reset", Trigger)), 0.0)
+        states = [self.after(1) for _ in range(50)]
+        self.assertNotEqual(wrench_with(states[-1]), saved)
+        self.assertTrue(self.call("load_state", FilePath, self.path("state")).success)
+        self.assertEqual(wrench_with(first_of(epoch=1)), saved)
+        self.assertEqual([numbers(self.after(1)) for _ in range(50)], [numbers(state) for state in states])
+        self.assertTrue(self.call("reset", Trigger).success)
+        self.assertEqual(wrench_with(first_of(epoch=2)), 0.0)
 
     def test_several_threads(self):
         glue = SCENE.split("threads:\n")[1].replace("name: honey", "name: glue").replace("[0, 0, 0.03]", "[0.1, 0, 0.03]")
@@ -166,14 +165,14 @@ class Thread(NodeCase):
         self.assertIn("threads/glue/nozzle/flow: dropped", self.output("rod.err") + self.output("rod.out"))
         flow.publish(2 * FLOW)
         self.arrived()
-        stamp = self.step(50).stamp
-        wait_until(lambda: sum(s.header.stamp == stamp for s in states.all()) == 2, what="both threads")
-        fed = {s.name: s.fed_volume for s in states.all() if s.header.stamp == stamp}
+        both = states.all_at(self.step(50).stamp, 2)
+        self.assertEqual(len(both), 2)
+        fed = {s.name: s.fed_volume for s in both}
         self.assertAlmostEqual(fed["honey"], 50 * STEP * FLOW, delta=1e-9 * FLOW)
         self.assertAlmostEqual(fed["glue"], 100 * STEP * FLOW, delta=1e-9 * FLOW)
         values = self.diagnostics("simulation")
         self.assertEqual(values["threads and pieces"], "2")
-        self.assertEqual(int(values["nodes"]), sum(len(s.nodes) for s in states.all() if s.header.stamp == stamp))
+        self.assertEqual(int(values["nodes"]), sum(len(s.nodes) for s in both))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseStamped
 from slender_sim.msg import RodState
 from std_srvs.srv import SetBool, Trigger
 
-from node_harness import SCENE, NodeCase, pose, run, wait_until
+from node_harness import SCENE, NodeCase, pose, run, status_of, wait_until
 
 RIGHT = "/t/grasps/right/pose"
 STEP, INTERVAL = 0.005, 0.01   # [s]
@@ -33,11 +33,7 @@ class Timing(NodeCase):
         """The newest of the node's reports, without connecting anew each time."""
         if not hasattr(self, "reports"):
             self.reports = self.listen("/diagnostics", DiagnosticArray)
-        wait_until(lambda: self.reports.count() > 0, what="diagnostics")
-        for status in self.reports.last().status:
-            if status.name == "/t/rod: " + kind:
-                return dict({value.key: value.value for value in status.values}, message=status.message, level=status.level)
-        raise AssertionError("no status " + kind)
+        return status_of(self.reports.last(), kind)
 
     def lag(self):
         return float(self.status("simulation")["lag of stamps [s]"])
@@ -76,8 +72,10 @@ class Timing(NodeCase):
             wait_until(lambda: int(self.status("inputs")["received"]) >= sent, what="%d poses to arrive" % sent)
             self.step(4)   # two poses at once, as trackers send them over busy networks
             now += 4 * STEP
+        steps = round(length / STEP)
+        wait_until(lambda: int(self.status("simulation")["step"]) == steps, what="a report after the last step")
         status = self.status("inputs")
-        wait_until(lambda: state.count() >= round(length / STEP), what="all states")
+        wait_until(lambda: state.count() >= steps, what="all states")
         command = greatest_acceleration([swing(k * STEP) for k in range(round(length / STEP))])
         ratio = greatest_acceleration([m.nodes[-1].y for m in state.all()]) / command
         print("%d ms late: acceleration %.3f times the command's; lag %s s" % (ms, ratio, status["input lag right [s]"]))

@@ -138,8 +138,7 @@ class TrackedRods(NodeCase):
         self.assertFalse(refused.success)
         self.assertIn("test function", refused.message)
         self.assertTrue(self.call("reset", Trigger).success)
-        self.after(5)
-        states = {s.name: s for s in self.states.all()[-2:]}
+        states = {s.name: s for s in self.states.all_at(self.step(5).stamp, 2)}
         self.assertLess(distance(xyz(states["rope"].guide_nodes), REST), 1e-12)   # forgets what was sent
         self.assertEqual((len(states["free"].guide_nodes), len(states["free"].constraint_errors), len(states["free"].guide_forces)), (0, 0, 0))
         wait_until(lambda: markers.count() > 0, what="markers")

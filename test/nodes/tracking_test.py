@@ -8,6 +8,7 @@ import subprocess
 
 import rosbag
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, PoseStamped
 from sensor_msgs.msg import PointCloud2, PointField
 from slender_sim.msg import BodyStates, ClothState, MeshStamped
@@ -15,7 +16,7 @@ from slender_sim.srv import FilePath, SetFunctions
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from node_harness import NodeCase, fill, find_program, run, wait_until
+from node_harness import NodeCase, fill, find_program, run, status_of, wait_until
 
 STEP = 0.01
 RATE = 25.0
@@ -152,13 +153,14 @@ class Tracking(NodeCase):
         self.assertLess(state.constraint_errors[0], 1e-12)
         total = sum(math.sqrt(f.x ** 2 + f.y ** 2 + f.z ** 2) for f in state.guide_forces)
         self.assertLess(total, 20 * 0.16 * (1 + 1e-9))
-        for _ in range(10):   # they tell of the steps since they told last
-            self.step(1)
-            told = self.diagnostics("simulation")
-            if int(told["most guide forces at their bounds"]) > 2:
-                break
-        self.assertGreater(int(told["most guide forces at their bounds"]), 2)
-        self.assertGreater(float(told["greatest distance where forces are at their bounds [m]"]), 0.05)
+        reports = self.listen("/diagnostics", DiagnosticArray)   # each tells of the steps since the one before it
+        self.step(10)
+
+        def told():
+            return [status for status in (status_of(report, "simulation") for report in reports.all())
+                    if int(status["most guide forces at their bounds"]) > 2]
+        wait_until(told, what="guide forces at their bounds in the diagnostics")
+        self.assertGreater(float(told()[0]["greatest distance where forces are at their bounds [m]"]), 0.05)
 
     def test_functions_are_switched(self):
         self.begin("{topic: points}", more="    test_functions: [{name: loose, regions: {all: {guide: [0..8]}}}, {name: tight, basis: subdivision, blend: 0.4}]\n")

@@ -268,7 +268,12 @@ class Tutorials(unittest.TestCase):
         pose = command("rostopic pub -r 20 -s /grasps/gripper/pose").replace("gripper", "hand")
         mover = self.shell(pose)
         sent = self.listen("/grasps/hand/pose", PoseStamped)
-        wait_for(lambda: sent.count() > 40, "two seconds of poses")   # the first of them is what later ones count from
+        diagnostics = self.listen("/diagnostics", DiagnosticArray)
+
+        def heard():   # the first pose that the node takes in is what later ones count from
+            values = {value.key: value.value for status in diagnostics.last().status for value in status.values}
+            return values.get("input age hand [s]", "none yet") != "none yet"
+        wait_for(lambda: sent.count() > 40 and diagnostics.count() > 0 and heard(), "two seconds of poses")
         self.stop(mover)
         self.shell(pose.replace("y: 0.2", "y: 0.3"))
         self.see(state, lambda m: abs(m.vertices[0].y - held.y - 0.1) < 1e-6, "the corner 0.1 m further")

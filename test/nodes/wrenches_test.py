@@ -10,6 +10,7 @@ from geometry_msgs.msg import WrenchStamped
 from slender_sim.msg import GraspStates, RodState
 from slender_sim.srv import SetGrasp, SetGraspRequest
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 
 from node_harness import SCENE, NodeCase, find_program, run, wait_until
 
@@ -36,14 +37,13 @@ class Wrenches(NodeCase):
 
     def after(self, n):
         stamp = self.step(n).stamp
-        for listener in (self.states, self.raw, self.filtered):
-            wait_until(lambda: listener.last().header.stamp == stamp, what="the last message")
-        return self.states.last(), self.raw.last(), self.filtered.last()
+        return self.states.at(stamp), self.raw.at(stamp), self.filtered.at(stamp)
 
     def test_axes_are_those_of_the_grasp(self):
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
         self.begin()
+        self.listen("/tf", TFMessage)   # the buffer shares its connection
         states, wrench, _ = self.after(200)
         self.assertEqual(wrench.header.frame_id, "t/rod/grasps/left")
         q = states.pose[states.name.index("left")].orientation
@@ -93,8 +93,8 @@ class Wrenches(NodeCase):
         listeners = {topic: self.listen(topic, kind) for topic, kind in topics.items()}
         listeners["/t/state"] = self.listen("/t/state", RodState)
         stamp = self.step(50).stamp
-        for topic, listener in listeners.items():
-            wait_until(lambda: listener.last().header.stamp == stamp, what=topic)
+        for listener in listeners.values():
+            listener.at(stamp)
         with rosbag.Bag(self.path("topics.bag"), "w") as bag:
             for topic, listener in listeners.items():
                 for message in listener.all():
