@@ -66,10 +66,7 @@ public:
         f(i, static_cast<int>(entry.col()), entry.value());
   }
   /// Adds a change of multipliers, three per average.
-  void addMultipliers(const double* change)
-  {
-    forces -= Eigen::Map<const Eigen::Matrix3Xd>(change, 3, count());
-  }
+  void addMultipliers(const double* change) { forces -= Eigen::Map<const Eigen::Matrix3Xd>(change, 3, count()); }
 
   /// With which the averages act on the part (3 x count [N]), spread over its points by their weights.
   Eigen::Matrix3Xd forces;

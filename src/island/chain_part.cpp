@@ -97,8 +97,9 @@ double ChainPart::forceScale() const
 {
   double largest = system_.forceScale();
   if (averages_)
-    largest = std::max(largest, averages_->forces.cwiseAbs().maxCoeff() /
-                                    static_cast<double>(std::max<Eigen::Index>(1, system_.nodes() / averages_->count())));
+    largest =
+        std::max(largest, averages_->forces.cwiseAbs().maxCoeff() /
+                              static_cast<double>(std::max<Eigen::Index>(1, system_.nodes() / averages_->count())));
   return largest;
 }
 

@@ -164,7 +164,7 @@ private:
   double duration_ = 1.0;
 
   SharedMatrix matrix_;
-  SchurComplement schur_;            ///< of the averages of coupled parts
+  SchurComplement schur_;             ///< of the averages of coupled parts
   std::vector<double> constrained_;   ///< direction of all coupled unknowns
   bool pattern_valid_ = false, exact_ = false;
   HessianShift shift_;   ///< of the last evaluation with a Hessian

@@ -78,8 +78,8 @@ public:
 /// part that is not coupled solves with its own matrix. It stays so while it touches only what moves as prescribed,
 /// because such contacts couple no more than neighbouring points of the part; they are its own contacts.
 ///
-/// The averages of a part may be prescribed. Then Equations makes the directions of coupled parts leave these alone, and
-/// the part does so in its own solve(). Its gradient has the forces of the averages.
+/// The averages of a part may be prescribed. Then Equations makes the directions of coupled parts leave these alone,
+/// and the part does so in its own solve(). Its gradient has the forces of the averages.
 class Part : public PartInIsland, public PartSurface
 {
 public:

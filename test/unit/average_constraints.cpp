@@ -201,8 +201,7 @@ struct Other
 void PrintTo(const Other& other, std::ostream* out) { *out << other.name; }
 
 class TrackedRodMeets : public testing::TestWithParam<Other>
-{
-};
+{};
 
 /// Averages stay exact, and guides alone change the momentum of all.
 TEST_P(TrackedRodMeets, AndAveragesAreExact)

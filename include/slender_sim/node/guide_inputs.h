@@ -95,7 +95,8 @@ public:
   /// Returns "NAME for grasp G" for each body that an object follows by the topic `bodies`, as long as no message has
   /// named this body.
   std::vector<std::string> unheardBodies() const;
-  /// Returns "KIND NAME (topic T)" for each object with a pose topic of its own, as long as no message has arrived there.
+  /// Returns "KIND NAME (topic T)" for each object with a pose topic of its own, as long as no message has arrived
+  /// there.
   std::vector<std::string> unheardTopics() const;
   /// Returns the state of each tf frame that an object follows.
   std::vector<TfInputs::State> frames() const { return tf_->states(); }
