@@ -12,9 +12,8 @@ StepFailure RodPart::beginSubstep(const StepPlan& plan, const Substep& substep)
   const StepFailure failure = rod_.beginStep(plan, *inputs_, duration_, substep.from, substep.length);
   if (failure != StepFailure::none || !averages_)
     return failure;
-  return averages_->prepare(rod_.model->mass, [this](int node) { return system_.isFree(node); })
-             ? StepFailure::none
-             : StepFailure::singular_matrix;   // averages depend on each other
+  dependent_ = !averages_->prepare(rod_.model->mass, [this](int node) { return system_.isFree(node); });
+  return dependent_ ? StepFailure::singular_matrix : StepFailure::none;
 }
 
 /// Contacts count from the first step on.
@@ -164,10 +163,14 @@ double RodPart::energyAtStart(double& allowance)
 
 void RodPart::refuse(StepFailure failure, double length, StepReport& report) const
 {
-  const char* dependent =
-      "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
-  rod_.refuseUnsolved(report, failure, length, false,
-                      averages_ && failure == StepFailure::singular_matrix ? dependent : "");
+  const char* why = "";
+  if (dependent_)
+    why = "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
+  else if (averages_ && (coupled || !own_terms.empty()))
+    why =
+        "what the rod touches or is welded to may not let it have the averages of its guide: keep the guide clear of "
+        "that, or let it move by less at once";
+  rod_.refuseUnsolved(report, failure, length, false, why);
 }
 
 }   // namespace slender

@@ -121,6 +121,28 @@ TEST(AverageConstraints, ThatDependOnEachOtherAreRefused)
   EXPECT_TRUE(state.rods[0].x == before);
 }
 
+/// A guide that goes through a floor cannot be followed. The message names the guide, and nothing is lost.
+TEST(AverageConstraints, ThatAFloorDoesNotAllowAreRefused)
+{
+  Simulation s(parseScene(kOpen, "rope",
+                          {"time.step=0.005", "rods.0.contact={}",
+                           "obstacles=[{name: floor, shape: {plane: {point: [0, 0, -0.05]}}}]"}));
+  SceneInputs inputs = s.defaultInputs();
+  StepReport report;
+  double lowest = 0.0;
+  for (int k = 0; k < 100 && report.ok; ++k)
+  {
+    lowest = s.state().rods[0].x.row(2).minCoeff();
+    inputs.rod_guides[0].row(2).array() -= 0.001;
+    report = s.step(inputs);
+  }
+  EXPECT_FALSE(report.ok);
+  EXPECT_NE(report.message.find("the averages of its guide"), std::string::npos) << report.message;
+  EXPECT_EQ(s.state().rods[0].x.row(2).minCoeff(), lowest);
+  EXPECT_GT(lowest, -0.05 + 0.004);
+  EXPECT_LT(lowest, -0.05 + 0.006);
+}
+
 // ---- with other objects in one island
 
 /// A cable whose guide lifts it into what lies above it.
