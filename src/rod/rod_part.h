@@ -103,7 +103,7 @@ private:
   const RodInputs* inputs_ = nullptr;
   double duration_ = 1.0;
   bool welded_ = false;
-  bool dependent_ = false;   ///< averages depend on each other on the nodes that are free
+  bool dependent_ = false;                            ///< averages depend on each other on the nodes that are free
   std::vector<std::array<int, 3>> carried_entries_;   ///< node, column, row of those with a carried unknown
   std::vector<std::array<int, 4>> holds_;             ///< grasps that dof_ was made for: active, first, last, carried
 };

@@ -165,7 +165,8 @@ void RodPart::refuse(StepFailure failure, double length, StepReport& report) con
 {
   const char* why = "";
   if (dependent_)
-    why = "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
+    why =
+        "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
   else if (averages_ && (coupled || !own_terms.empty()))
     why =
         "what the rod touches or is welded to may not let it have the averages of its guide: keep the guide clear of "

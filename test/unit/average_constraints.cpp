@@ -124,9 +124,9 @@ TEST(AverageConstraints, ThatDependOnEachOtherAreRefused)
 /// A guide that goes through a floor cannot be followed. The message names the guide, and nothing is lost.
 TEST(AverageConstraints, ThatAFloorDoesNotAllowAreRefused)
 {
-  Simulation s(parseScene(kOpen, "rope",
-                          {"time.step=0.005", "rods.0.contact={}",
-                           "obstacles=[{name: floor, shape: {plane: {point: [0, 0, -0.05]}}}]"}));
+  Simulation s(parseScene(
+      kOpen, "rope",
+      {"time.step=0.005", "rods.0.contact={}", "obstacles=[{name: floor, shape: {plane: {point: [0, 0, -0.05]}}}]"}));
   SceneInputs inputs = s.defaultInputs();
   StepReport report;
   double lowest = 0.0;
