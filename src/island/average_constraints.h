@@ -8,8 +8,9 @@
 namespace slender {
 
 /// Weighted averages of a part's points that are prescribed: C x = targets (thesis 6.4.3, see WeakConstraints). The
-/// averages move uniformly in a step, like all that is prescribed. The base and the trial of the part always have the
-/// averages of the present instant. Directions of Newton's method leave the averages alone, see SchurComplement.
+/// averages move uniformly in a step, like everything that is prescribed. The base and the trial of the part always
+/// have the averages of the present instant. Directions of Newton's method do not change the averages, see
+/// SchurComplement.
 class AverageConstraints
 {
 public:
@@ -68,7 +69,7 @@ public:
   /// Adds a change of multipliers, three per average.
   void addMultipliers(const double* change) { forces -= Eigen::Map<const Eigen::Matrix3Xd>(change, 3, count()); }
 
-  /// With which the averages act on the part (3 x count [N]), spread over its points by their weights.
+  /// Forces of the averages on the part (3 x count [N]). The weights spread each force over the points.
   Eigen::Matrix3Xd forces;
 
 private:

@@ -80,7 +80,7 @@ void Equations::place(double fraction)
   follow();
 }
 
-/// Puts into the trial what follows from the motion of the parts.
+/// Moves in the trial what depends on the motion of other parts, then restores the prescribed averages.
 void Equations::follow()
 {
   for (Part* part : parts_)

@@ -324,8 +324,8 @@ bool Equations::anyAverages() const
   return std::any_of(parts_.begin(), parts_.end(), [](Part* part) { return part->coupled && part->averages(); });
 }
 
-/// Takes out of the solution what would change the prescribed averages of coupled parts. Points may be carried by
-/// bodies, whose unknowns then take part.
+/// Removes from the solution the component that would change the prescribed averages of coupled parts. If a body
+/// carries some of the points, the constraints contain the unknowns of the body.
 void Equations::keepAverages()
 {
   Eigen::Index rows = 0;

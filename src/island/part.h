@@ -78,8 +78,8 @@ public:
 /// part that is not coupled solves with its own matrix. It stays so while it touches only what moves as prescribed,
 /// because such contacts couple no more than neighbouring points of the part; they are its own contacts.
 ///
-/// The averages of a part may be prescribed. Then Equations makes the directions of coupled parts leave these alone,
-/// and the part does so in its own solve(). Its gradient has the forces of the averages.
+/// The averages of a part may be prescribed. Directions must not change them: Equations takes care of this for coupled
+/// parts, and the other parts do so in solve(). The gradient of a part contains the forces of its averages.
 class Part : public PartInIsland, public PartSurface
 {
 public:
@@ -106,9 +106,9 @@ public:
   virtual void retreatHeld(double) {}
   /// Puts into the trial what joints make the part follow, after all parts have moved.
   virtual void followJoints() {}
-  /// Averages of its points that are prescribed; null: none.
+  /// The prescribed averages of its points; null: none.
   virtual AverageConstraints* averages() { return nullptr; }
-  /// Moves free points of the trial so that the averages are those that are prescribed, after followJoints().
+  /// Moves free points of the trial so that they have the prescribed averages. Call it after followJoints().
   virtual void meetAverages() {}
 
   // ---- equations

@@ -6,12 +6,12 @@
 
 namespace slender {
 
-/// Keeps directions of Newton's method within linear constraints C d = 0, by the Schur complement S = C K^-1 C^T of a
-/// matrix K that somebody else can solve with.
+/// Makes directions d of Newton's method satisfy linear constraints C d = 0. It uses the Schur complement S = C K^-1
+/// C^T of the matrix K of Newton's method. The caller solves the equations with K.
 class SchurComplement
 {
 public:
-  /// C has no entries from now on.
+  /// Begins a new matrix C of this size, without entries.
   void begin(Eigen::Index rows, Eigen::Index unknowns)
   {
     entries_.clear();
@@ -21,9 +21,10 @@ public:
     if (factor_.cols() != rows)
       factor_ = Eigen::LDLT<Eigen::MatrixXd>(rows);
   }
+  /// Adds an entry to C.
   void add(Eigen::Index row, Eigen::Index unknown, double value) { entries_.push_back({row, unknown, value}); }
 
-  /// Takes the part out of a direction that leaves the constraints. solve(x): x := K^-1 x.
+  /// Removes from a direction the component that violates the constraints. solve(x) replaces x by K^-1 x.
   template <class Solve>
   void correct(double* direction, Solve&& solve)
   {
@@ -40,7 +41,7 @@ public:
     factor_.solveInPlace(change_);
     Eigen::Map<Eigen::VectorXd>(direction, columns_.rows()).noalias() -= columns_ * change_;
   }
-  /// By how much correct() changed the multiplier of each row. The constraints act on the unknowns with -C^T times the
+  /// Returns the change of each row's multiplier in the last correct(). The constraints exert the forces -C^T times the
   /// multipliers.
   const Eigen::VectorXd& change() const { return change_; }
 

@@ -1,4 +1,4 @@
-// What the inputs of a node say about themselves: what nobody has published yet, and how old the rest is.
+// Reports on the inputs of a node: which poses have not been published yet, and how old the other inputs are.
 #include "slender_sim/node/guide_inputs.h"
 
 namespace slender {

@@ -20,7 +20,26 @@ std::string colorLine(MarkerColor what, double range)
   return text;
 }
 
+/// Returns the box of all objects, with the nozzles that rviz shows behind threads.
+Eigen::AlignedBox3d shownBox(const Simulation& simulation)
+{
+  Eigen::AlignedBox3d box = sceneBox(simulation.state());
+  for (std::size_t k = 0; k < simulation.config().threads.size(); ++k)
+    if (const auto& nozzle = simulation.config().threads[k].nozzle)
+    {
+      const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
+      box.extend(X * Eigen::Vector3d(-4.0 * nozzle->diameter, 0, 0));
+    }
+  return box;
+}
+
 }   // namespace
+
+double legendLetters(const Simulation& simulation)
+{
+  const Eigen::AlignedBox3d box = shownBox(simulation);
+  return box.isEmpty() ? 0.0 : 0.04 * box.diagonal().norm();
+}
 
 Eigen::AlignedBox3d sceneBox(const SceneState& state)
 {
@@ -37,12 +56,6 @@ Eigen::AlignedBox3d sceneBox(const SceneState& state)
   for (const ClothState& cloth : state.cloths)
     extend(cloth.x);
   return box;
-}
-
-double legendLetters(const SceneState& state)
-{
-  const Eigen::AlignedBox3d box = sceneBox(state);
-  return box.isEmpty() ? 0.0 : 0.04 * box.diagonal().norm();
 }
 
 void addLegend(const Simulation& simulation, const std_msgs::Header& header, const MarkerOptions& options, double range,
@@ -62,13 +75,7 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
                   options.forces);
     text += line;
   }
-  Eigen::AlignedBox3d box = sceneBox(simulation.state());
-  for (std::size_t k = 0; k < simulation.config().threads.size(); ++k)   // not behind a nozzle
-    if (const auto& nozzle = simulation.config().threads[k].nozzle)
-    {
-      const Pose& X = simulation.state().threads[k].threads.front().ends[1].X_WE;
-      box.extend(X * Eigen::Vector3d(-4.0 * nozzle->diameter, 0, 0));
-    }
+  const Eigen::AlignedBox3d box = shownBox(simulation);
   Marker marker = makeMarker(header, "legend", 0, Marker::TEXT_VIEW_FACING);
   if (text.empty() || box.isEmpty())
   {
@@ -76,7 +83,7 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
     out.markers.push_back(std::move(marker));
     return;
   }
-  const double letters = options.letters > 0.0 ? options.letters : legendLetters(simulation.state());
+  const double letters = options.letters > 0.0 ? options.letters : legendLetters(simulation);
   Eigen::Vector3d place = box.center();
   place.z() = box.max().z() + 2.5 * letters;
   marker.pose.position = toPoint(place);

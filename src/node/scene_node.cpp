@@ -393,8 +393,8 @@ void SceneNode::publishMarkers()
   header.stamp = clock_.stamp();
   header.frame_id = options_.frame_id;
   options_.markers.note = paceNote();
-  if (options_.markers.letters == 0.0)   // the view of rviz does not grow with the scene either
-    options_.markers.letters = legendLetters(simulation_->state());
+  if (options_.markers.letters == 0.0)   // The letters keep their size, because the view does not grow with the scene.
+    options_.markers.letters = legendLetters(*simulation_);
   markers_pub_.publish(
       boost::make_shared<visualization_msgs::MarkerArray>(sceneMarkers(*simulation_, header, options_.markers)));
 }

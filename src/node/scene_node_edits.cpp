@@ -145,6 +145,7 @@ void SceneNode::takeUp(EditedScene edited)
     }
   if (topics_->has_cloths)
     publishMesh();
+  options_.markers.letters = 0.0;   // The next picture chooses them for the edited scene.
   deleteMarkers(*edited.simulation);
   drawn_.reset();
 }

@@ -15,7 +15,7 @@ namespace slender {
 class RodPart : public ChainPart
 {
 public:
-  /// averages: weights of averages that are prescribed, count x nodes, see AverageConstraints; null: none are.
+  /// averages: the matrix C of AverageConstraints, count x nodes; null: no averages are prescribed.
   RodPart(RodStepper::Impl& rod, bool touches, const AverageConstraints::Matrix* averages = nullptr)
     : ChainPart(rod.system),
       rod_(rod),
@@ -103,7 +103,7 @@ private:
   const RodInputs* inputs_ = nullptr;
   double duration_ = 1.0;
   bool welded_ = false;
-  bool dependent_ = false;                            ///< averages depend on each other on the nodes that are free
+  bool dependent_ = false;   ///< the prescribed averages depend on each other on the free nodes
   std::vector<std::array<int, 3>> carried_entries_;   ///< node, column, row of those with a carried unknown
   std::vector<std::array<int, 4>> holds_;             ///< grasps that dof_ was made for: active, first, last, carried
 };

@@ -125,7 +125,7 @@ std::string localTime()
   return text;
 }
 
-/// Results of the two extents must not be mixed.
+/// One report holds the results of one extent only.
 std::string extent(bool quick) { return std::string(quick ? "quick" : "full") + " report\n"; }
 
 std::string thisVersion()
@@ -133,6 +133,8 @@ std::string thisVersion()
   const std::string commit = SLENDER_COMMIT;
   return SLENDER_VERSION + (commit.empty() ? "" : ", commit " + commit);
 }
+
+std::string processor() { return systemValue("/proc/cpuinfo", "model name"); }
 
 using Facts = std::vector<std::pair<std::string, std::string>>;
 
@@ -144,7 +146,7 @@ Facts facts(bool quick)
   return {{"version", thisVersion()},
           {"made", localTime()},
           {"extent", quick ? "quick: fewer and coarser cases" : "full"},
-          {"processor", systemValue("/proc/cpuinfo", "model name")},
+          {"processor", processor()},
           {"memory", systemValue("/proc/meminfo", "MemTotal")},
           {"system", std::string(system.sysname) + " " + system.release},
           {"compiler", "GCC " __VERSION__},
@@ -171,7 +173,8 @@ void prepare(const ReportOptions& options)
 
 std::string versionFile(const ReportedStudy& s) { return s.folder + "/version.txt"; }
 
-/// The versions that made the results of `sections`, the most frequent one first. All others list their studies.
+/// Returns the versions and processors that made the results of `sections`. The one with the most results comes first.
+/// Each other one is followed by the names of its studies.
 std::string versionsOf(const std::vector<ReportSection>& sections)
 {
   std::map<std::string, std::vector<std::string>> studies;
@@ -194,7 +197,7 @@ std::string versionsOf(const std::vector<ReportSection>& sections)
   return text;
 }
 
-/// Replaces the version of the program that runs by those of the results, if the results tell theirs.
+/// Replaces the version of the running program by the versions of the results, where these are known.
 void tellVersions(Facts& facts, const std::vector<ReportSection>& sections)
 {
   const std::string versions = versionsOf(sections);
@@ -314,7 +317,7 @@ int makeReport(const ReportOptions& options)
                    if (!fs::exists(todo[k]->folder + "/result.json"))
                      todo[k]->failure = why;
                  }
-                 std::ofstream(versionFile(*todo[k])) << thisVersion();
+                 std::ofstream(versionFile(*todo[k])) << thisVersion() << " on " << processor();
                  progress.show(++done);
                });
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -9,7 +9,6 @@
 #include "cloth/cloth_part.h"
 #include "island/island.h"
 #include "rod/rod_part.h"
-#include "rod/rod_part.h"
 #include "thread/thread_part.h"
 #include "island_finder.h"
 #include "slender_sim/world/world_model.h"

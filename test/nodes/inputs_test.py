@@ -5,7 +5,8 @@ import math
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, PoseStamped, Twist
-from node_harness import SCENE, NodeCase, fill, pose, run, wait_until
+from node_harness import SCENE, Listener, NodeCase, fill, pose, run, wait_until
+from rosgraph_msgs.msg import Log
 from slender_sim.msg import BodyStates, RodState
 from tf2_msgs.msg import TFMessage
 from geometry_msgs.msg import TransformStamped
@@ -40,6 +41,16 @@ class Inputs(NodeCase):
         self.arrived()
         self.assert_near(self.end(state, 250), (1, 0.1, 1))
         self.assertEqual(self.dropped("out_of_order"), 0)
+
+    def test_silent_topics_are_named_once(self):
+        log = Listener("/rosout", Log)
+        self.start(pace="wall")
+        note = "nobody has published a pose yet for grasp right (topic grasps/right/pose)"
+        notes = lambda: [message for message in log.all() if note in message.msg]
+        wait_until(notes, what="the note")
+        reports = self.listen("/diagnostics", DiagnosticArray)
+        wait_until(lambda: reports.count() > 2, what="further looks at the inputs")
+        self.assertEqual(len(notes()), 1)
 
     def test_guides_move_all(self):
         self.start()

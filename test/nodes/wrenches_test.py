@@ -8,7 +8,7 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import WrenchStamped
 from slender_sim.msg import GraspStates, RodState
-from slender_sim.srv import SetGrasp, SetGraspRequest
+from slender_sim.srv import EditScene, SetGrasp, SetGraspRequest
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -76,6 +76,8 @@ class Wrenches(NodeCase):
                                   SetGraspRequest(name="left", action=SetGraspRequest.RELEASE)).success)
         _, raw, filtered = self.after(1)
         self.assertEqual(raw.wrench.force.x, 0.0)
+        far = "bodies: [{name: far, mass: 1, shape: {sphere: {radius: 0.1}}, pose: {position: [9, 0, 0]}}]"
+        self.assertTrue(self.call("spawn", EditScene, far).success)   # an edit does not begin the filter anew
         _, raw, filtered = self.after(19)                   # 0.1 s in all
         size = math.sqrt(sum(c * c
                              for c in (filtered.wrench.force.x, filtered.wrench.force.y, filtered.wrench.force.z)))

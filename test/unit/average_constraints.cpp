@@ -121,7 +121,8 @@ TEST(AverageConstraints, ThatDependOnEachOtherAreRefused)
   EXPECT_TRUE(state.rods[0].x == before);
 }
 
-/// A guide that goes through a floor cannot be followed. The message names the guide, and nothing is lost.
+/// A rod cannot follow its guide through a floor. The step is refused with a message about the guide, and the state
+/// stays as it was.
 TEST(AverageConstraints, ThatAFloorDoesNotAllowAreRefused)
 {
   Simulation s(parseScene(
@@ -159,7 +160,10 @@ rods:
     track:
       guide:
         nodes: 3
-        motion: {table: [[0, -0.02, 0, 0, 0, 0, 0, 0.02, 0, 0], [0.04, -0.02, 0, 0.002, 0, 0.001, 0.004, 0.02, 0, 0.003]]}
+        motion:
+          table:
+            - [0, -0.02, 0, 0, 0, 0, 0, 0.02, 0, 0]
+            - [0.04, -0.02, 0, 0.002, 0, 0.001, 0.004, 0.02, 0, 0.003]
 )";
 
 const char* const kRod = R"(
@@ -191,12 +195,20 @@ cloths:
 
 const char* const kBall = R"(
 bodies:
-  - {name: ball, mass: 0.0002, shape: {sphere: {radius: 0.004}}, pose: {position: [0.001, 0.0005, 0.0054]}, friction: 0.3}
+  - name: ball
+    mass: 0.0002
+    shape: {sphere: {radius: 0.004}}
+    pose: {position: [0.001, 0.0005, 0.0054]}
+    friction: 0.3
 )";
 
 const char* const kWelded = R"(
 bodies:
-  - {name: clip, mass: 0.0002, inertia: [1.0e-8, 1.0e-8, 1.0e-8], pose: {position: [0.02, 0, 0]}, welds: [{rod: cable, edge: -1}]}
+  - name: clip
+    mass: 0.0002
+    inertia: [1.0e-8, 1.0e-8, 1.0e-8]
+    pose: {position: [0.02, 0, 0]}
+    welds: [{rod: cable, edge: -1}]
 )";
 
 Vector3d momentum(const Simulation& s)
@@ -225,7 +237,7 @@ void PrintTo(const Other& other, std::ostream* out) { *out << other.name; }
 class TrackedRodMeets : public testing::TestWithParam<Other>
 {};
 
-/// Averages stay exact, and guides alone change the momentum of all.
+/// The averages stay exact. Only the forces of the guides change the total momentum.
 TEST_P(TrackedRodMeets, AndAveragesAreExact)
 {
   Simulation s(parseScene(kLifted + GetParam().scene, "lifted"));

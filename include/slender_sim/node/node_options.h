@@ -56,7 +56,7 @@ struct MarkerOptions
   double range = 0.0;
   /// ~marker_forces [m/N]: length of the arrows of contact forces and of forces on grasps; 0: no arrows
   double forces = 0.0;
-  /// [m] height of a letter of the legend, which no parameter sets; 0: a part of the scene's present size
+  /// Height of the legend's letters [m]. With 0 it follows the present size of the scene. No parameter sets it.
   double letters = 0.0;
   /// extra line of the legend, which no parameter sets: how fast time passes in the picture; empty: no line
   std::string note;

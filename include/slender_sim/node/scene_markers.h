@@ -27,7 +27,7 @@ namespace slender {
 visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const std_msgs::Header& header,
                                              const MarkerOptions& options = {});
 
-/// Returns the height [m] of the legend's letters that suits the size of the scene in this state; 0 without objects.
-double legendLetters(const SceneState& state);
+/// Returns the height [m] of the legend's letters that suits the present size of the scene; 0 without objects.
+double legendLetters(const Simulation& simulation);
 
 }   // namespace slender

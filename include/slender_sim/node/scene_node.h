@@ -186,7 +186,7 @@ private:
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
-  bool told_of_topics_ = false;   // which pose topics nobody has published on
+  bool told_of_topics_ = false;   // the log has named the pose topics without messages
   bool stepping_ = false;         // in ~step
   bool guides_led_on_ = false;    // guides are at the end of a step that was not taken
   std::string step_ended_;        // name of the call that ended ~step; empty while ~step goes on
