@@ -70,8 +70,7 @@ std::string ClothStages::explain(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + milliseconds(length);
   if (failure == StepFailure::singular_matrix && averages && !averages->independent())
-    return "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave "
-           "out the averages there";
+    return kDependentAverages;
   if (failure == StepFailure::singular_matrix)
     return "the matrix is not positive definite" + at +
            ": sizes or moduli differ by too many orders of magnitude, or a grasp or force is too fast or too large by "
@@ -94,7 +93,7 @@ std::string ClothStages::explain(StepFailure failure, double length) const
          "shape whose faces have area";
 }
 
-StepReport ClothStages::refuseUnsolved(StepReport& report, StepFailure failure, double length)
+StepReport ClothStages::refuseUnsolved(StepReport& report, StepFailure failure, double length, const char* why)
 {
   // explicit steps end in a state that says nothing, and a spent budget may have left none; then the state at the start
   // of the step is looked at
@@ -124,7 +123,8 @@ StepReport ClothStages::refuseUnsolved(StepReport& report, StepFailure failure, 
   else
     text += ", of which the first";
   return refuse(report, failure,
-                explain(failure, length) + text + " was at " + metres(report.place.position) + " as the step began");
+                (*why ? why : explain(failure, length)) + text + " was at " + metres(report.place.position) +
+                    " as the step began");
 }
 
 }   // namespace slender

@@ -13,22 +13,33 @@ namespace {
 
 constexpr double kNear = 0.1;           ///< increment, over the shortest edge, below which the exact Hessian is taken
 constexpr double kShiftOfAngle = 0.2;   ///< of the weight of inertia, per unit of a shift of angles
-constexpr double kMostTurn = 0.7;       ///< of an edge in an iteration [rad], as for edges of rods
+// The Schur complement solves three times as many systems in each iteration.
+constexpr int kMostAverages = 500;
+constexpr double kMostTurn = 0.7;   ///< of an edge in an iteration [rad], as for edges of rods
 
 }   // namespace
 
 ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options)
-  : own_(std::make_unique<ClothStages>(std::move(model), options)),
+  : own_(std::make_unique<ClothStages>(std::move(model), options, false)),
     stages_(*own_)
 {
   const ClothModel& m = *stages_.model;
   if (options.integrator != Integrator::implicit_euler)
     throw std::invalid_argument("cloth '" + m.name +
                                 "': contact and joints with other objects need time.integrator: implicit_euler");
-  if (!m.averages.empty())
-    throw std::invalid_argument("cloth '" + m.name +
-                                "': a cloth that tracks a guide cannot touch, or be joined to, other objects than "
-                                "cloth and what moves as prescribed");
+  for (const PrescribedAverages& set : m.averages)
+  {
+    if (set.bounds.size() > 0)
+      throw std::invalid_argument("cloth '" + m.name +
+                                  "': bounds of the forces of averages (max_traction) need contact by impulses, or no "
+                                  "contact");
+    if (set.count() > kMostAverages)
+      throw std::invalid_argument("cloth '" + m.name + "': contact by the barrier takes at most " +
+                                  std::to_string(kMostAverages) + " averages, and this cloth has " +
+                                  std::to_string(set.count()) +
+                                  ": take fewer and larger test functions, or contact by impulses");
+    average_sets_.push_back(std::make_unique<AverageConstraints>(*set.weights));
+  }
   allocate();
 }
 
@@ -54,12 +65,19 @@ void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double
   counts_ = {};
   stages_.begin(state, inputs, duration);
   setPins(state.pins);
+  duration_ = duration;
+  averages_ = average_sets_.empty() ? nullptr : average_sets_[static_cast<std::size_t>(state.average_set)].get();
+  if (averages_)
+    averages_->begin(state.x, inputs.averages);
 }
 
 StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
   stages_.beginStep(plan, substep.from, substep.to);
-  return StepFailure::none;
+  dependent_ = averages_ && !averages_->prepare(stages_.model->mass, [this](int i) { return !system().held()[i]; });
+  if (averages_)
+    averages_->place(substep.to / duration_);
+  return dependent_ ? StepFailure::singular_matrix : StepFailure::none;
 }
 
 void ClothPart::beginStage(std::size_t stage)
@@ -69,6 +87,9 @@ void ClothPart::beginStage(std::size_t stage)
     stages_.placeLinearized(direction_);
   else
     stages_.placeGuess();
+  if (averages_)
+    averages_->forces.setZero();
+  meetAverages();
   base_ = system().start();
   near_ = indefinite_ = false;
 }
@@ -81,6 +102,8 @@ void ClothPart::endStage(std::size_t stage, bool last, StepReport& report)
     return;
   }
   stages_.takeEnd(std::max(largest_internal_, largest_contact_), evaluation.max_strain, report);
+  if (averages_)
+    stages_.average_forces = averages_->forces;
   report.linear_iterations += counts_.linear_iterations;
   counts_ = {};
 }
@@ -100,6 +123,19 @@ StepFailure ClothPart::givesUp() const
   if (own_ || exact_ || coupled || outcome_ == LinearOutcome::solved)
     return StepFailure::none;
   return outcome_ == LinearOutcome::not_converged ? StepFailure::linear_unconverged : StepFailure::singular_matrix;
+}
+
+void ClothPart::refuse(StepFailure failure, double length, StepReport& report) const
+{
+  report.linear_iterations += counts_.linear_iterations;
+  const char* why = "";
+  if (dependent_)
+    why = kDependentAverages;
+  else if (averages_ && failure != StepFailure::work_exceeded)
+    why =
+        "what the cloth touches may not let it have the averages of its guide: keep the guide clear of that, or let "
+        "it move by less at once";
+  stages_.refuseUnsolved(report, stages_.workExceeded() ? StepFailure::work_exceeded : failure, length, why);
 }
 
 Largest ClothPart::unbalancedForce() const
@@ -153,10 +189,21 @@ void ClothPart::placeHeld(double fraction)
   const std::vector<int>& pins = stages_.present().pins;
   for (std::size_t k = 0; k < pins.size(); ++k)
     vertex(stages_.x, pins[k]) = stages_.pinAt(k, fraction);
+  if (averages_)
+    averages_->place(fraction);
+}
+
+void ClothPart::meetAverages()
+{
+  if (averages_)
+    averages_->meet([this](int i) { return vertex(stages_.x, i); },
+                    [this](int i, int component, double length) { vertex(stages_.x, i)[component] += length; });
 }
 
 bool ClothPart::heldMoves(double from, double to) const
 {
+  if (from != to && averages_ && averages_->move())
+    return true;
   const std::vector<int>& pins = stages_.present().pins;
   for (std::size_t k = 0; k < pins.size(); ++k)
     if (from == to ? vertex(stages_.x, pins[k]) != vertex(base_, pins[k])
@@ -195,6 +242,10 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   evaluation.max_strain = e.max_strain;
   if (!with_hessian)
     largest_internal_ = stages_.closeGradient();
+  if (averages_)
+    averages_->forEntries([&](Eigen::Index i, int point, double weight) {
+      vertex(system().gradient(), point) -= weight * averages_->forces.col(i);
+    });
   if (coupled)
     return;
   addOwnContacts(with_hessian);
@@ -423,6 +474,8 @@ double ClothPart::forceScale() const
   largest = std::max(largest, m.mass.maxCoeff() * stages_.inputs().gravity.norm());
   for (const int p : stages_.present().pins)
     largest = std::max(largest, vertex(system().gradient(), p).norm());
+  if (averages_)   // each spreads its force over vertices
+    largest = std::max(largest, averages_->forces.cwiseAbs().maxCoeff() * averages_->count() / points());
   return largest;
 }
 

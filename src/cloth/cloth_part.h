@@ -20,12 +20,13 @@ namespace slender {
 class ClothPart final : public Part
 {
 public:
-  /// Throws std::invalid_argument for other integrators than implicit_euler, for prescribed averages, and for a model
-  /// or options that are not valid. The island minimises wholly, whether the options ask for one Newton step or not.
+  /// Throws std::invalid_argument for other integrators than implicit_euler, for averages whose forces have bounds, and
+  /// for a model or options that are not valid. The island minimises wholly, whether the options ask for one Newton
+  /// step or not. A cloth with prescribed averages is always coupled, because its own solvers know no averages.
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
-  /// A cloth that is alone in its island. It takes all implicit integrators of cloth, prescribed averages, and
-  /// `one_newton_step` of the options. The stages must outlive the part. The owner of the stages starts the budget of
-  /// work of each step.
+  /// A cloth that is alone in its island. It takes all implicit integrators of cloth, bounds of the forces of averages,
+  /// and `one_newton_step` of the options. The stages must outlive the part. The owner of the stages starts the budget
+  /// of work of each step.
   explicit ClothPart(ClothStages& stages);
 
   /// State, inputs, forces on pins, and messages.
@@ -54,11 +55,7 @@ public:
   StepFailure finishSubstep(StepReport&) override;
   void acceptSubstep(const Substep&) override { stages_.commitStep(); }
   Largest unbalancedForce() const override;
-  void refuse(StepFailure failure, double length, StepReport& report) const override
-  {
-    report.linear_iterations += counts_.linear_iterations;
-    stages_.refuseUnsolved(report, stages_.workExceeded() ? StepFailure::work_exceeded : failure, length);
-  }
+  void refuse(StepFailure failure, double length, StepReport& report) const override;
 
   bool shorterMayHelp(StepFailure) const override { return !stages_.workExceeded(); }
   StepFailure givesUp() const override;
@@ -71,6 +68,9 @@ private:
   BoundingBox surfaceBox(double ahead) const override;
 
   // ---- as Part
+  bool joined() const override { return averages_ != nullptr; }
+  AverageConstraints* averages() override { return averages_; }
+  void meetAverages() override;
   bool numberUnknowns() override;
   int unknowns() const override { return unknowns_; }
   void moveAlong(double alpha) override;
@@ -114,12 +114,17 @@ private:
   void allocate();
   bool solvesByFactors() const { return stages_.linear->kind() == ClothSolver::cholesky && !linearized_; }
 
-  std::unique_ptr<ClothStages> own_;   ///< null: the stages belong to another object
-  ClothStages& stages_;                ///< whose x is the trial
-  bool linearized_ = false;            ///< steps are one step of Newton's method
+  std::unique_ptr<ClothStages> own_;                                ///< null: the stages belong to another object
+  ClothStages& stages_;                                             ///< whose x is the trial
+  std::vector<std::unique_ptr<AverageConstraints>> average_sets_;   ///< of a cloth with stages of its own
+  AverageConstraints* averages_ =
+      nullptr;                ///< the set of the present step; null: the stages have it, or there is none
+  bool dependent_ = false;    ///< the averages depend on each other on the free vertices
+  bool linearized_ = false;   ///< steps are one step of Newton's method
   std::optional<ContactProperties> contact_;
   std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
   double contact_step_ = 0.0;                                  ///< [s]
+  double duration_ = 1.0;                                      ///< of the present step [s]
   std::shared_ptr<const Eigen::Matrix3Xd> rest_;
   std::vector<int> surface_pins_;   ///< that the surface has as driven corners
   long surface_version_ = 0;

@@ -7,10 +7,11 @@
 
 namespace slender {
 
-ClothStages::ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
+ClothStages::ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o, bool with_averages)
   : model(std::move(m)),
     options(o),
-    plastic_(*model)
+    plastic_(*model),
+    with_averages_(with_averages)
 {
   buildSystem(*model);
   const std::string who = "cloth '" + model->name + "': ";
@@ -73,7 +74,7 @@ void ClothStages::buildSystem(const ClothModel& of)
   linear.reset();
   system = std::make_unique<ClothSystem>(of, kind == ClothSolver::cholesky);
   averages = nullptr;
-  if (of.averages.empty() || kind != ClothSolver::conjugate_gradients)
+  if (of.averages.empty() || !with_averages_ || kind != ClothSolver::conjugate_gradients)
     linear = std::make_unique<ClothLinearSolver>(of, options, *system);
   else
   {

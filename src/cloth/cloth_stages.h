@@ -16,6 +16,10 @@ struct ClothBalance
   double force = 0;        ///< of all kinds
 };
 
+inline constexpr char kDependentAverages[] =
+    "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the "
+    "averages there";
+
 /// A step of one cloth in implicit stages, whose equations an island solves, see ClothPart.
 ///
 /// A step is begin(), substeps, end(). A substep is beginStep(); for each stage beginStage(), the solution of its
@@ -23,8 +27,9 @@ struct ClothBalance
 class ClothStages
 {
 public:
-  /// Throws std::invalid_argument for a model or options that are not valid.
-  ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
+  /// Throws std::invalid_argument for a model or options that are not valid. with_averages: the stages keep prescribed
+  /// averages; otherwise their owner does.
+  ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o, bool with_averages = true);
   virtual ~ClothStages() = default;
 
   /// Steps spend this from now on, which others start; null: one of their own.
@@ -32,8 +37,8 @@ public:
   /// Returns whether a step from this state with these inputs can begin. If not, the report says why.
   bool accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const;
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the cloth was farthest
-  /// from a solution.
-  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length);
+  /// from a solution. `why`: the reason, if it is not one of those that the failure has.
+  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length, const char* why = "");
   /// Lets the clamped faces act that `state` holds, and no others. Comes before each use of the system with another
   /// state.
   void followClamps(const ClothState& state);
@@ -92,7 +97,7 @@ public:
   ClothOptions options;
   std::unique_ptr<ClothSystem> system;
   std::unique_ptr<ClothLinearSolver> linear;
-  AveragedClothSolver* averages = nullptr;   ///< the same, where averages are prescribed; else null
+  AveragedClothSolver* averages = nullptr;   ///< the same, where the stages keep averages; else null
   PointVector x;                             ///< present configuration: a guess, or the solution of a stage
   Eigen::Matrix3Xd pin_forces;               ///< of the cloth on its pins at the end of the substep [N]
   Eigen::Matrix3Xd average_forces;           ///< of prescribed averages at the end of the substep [N]
@@ -134,6 +139,7 @@ protected:
   double average_work_ = 0, pin_work_ = 0;
 
 private:
+  const bool with_averages_;
   void buildSystem(const ClothModel& of);
   bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
   void combine(const Combination& c, PointVector& result) const;

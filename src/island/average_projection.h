@@ -1,23 +1,26 @@
 #pragma once
 
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCore>
 
 namespace slender {
 
-/// The least displacements of nodes, by the sum of mass times distance squared, that change weighted averages of them
+/// The least displacements of points, by the sum of mass times distance squared, that change weighted averages of them
 /// by given amounts.
 class AverageProjection
 {
 public:
   using Averages = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-  /// c: averages x nodes; must outlive it.
+  /// c: averages x points; must outlive it.
   explicit AverageProjection(const Averages& c)
     : c_(c),
-      weighted_(c.rows(), c.cols()),
+      scale_(Eigen::VectorXd::Zero(c.cols())),
+      free_(static_cast<std::size_t>(c.cols()), 2),
+      row_(Eigen::VectorXd::Zero(c.cols())),
       gram_(c.rows(), c.rows()),
       factor_(c.rows()),
       pull_(c.rows()),
@@ -25,17 +28,56 @@ public:
   {
   }
 
-  /// For nodes of these masses [kg], of which isFree(node) may move. False: averages depend on each other on these.
+  /// For points of these masses [kg], which are always the same, of which isFree(point) may move. False: averages
+  /// depend on each other on these.
   template <class IsFree>
   bool prepare(const Eigen::VectorXd& mass, const IsFree& isFree)
   {
-    mass_ = &mass;
-    weighted_.setZero();
+    bool known = true;
+    for (Eigen::Index j = 0; j < c_.cols(); ++j)
+    {
+      const char is_free = isFree(static_cast<int>(j));
+      known = known && free_[j] == is_free;
+      free_[j] = is_free;
+      scale_[j] = is_free ? 1.0 / mass[j] : 0.0;
+    }
+    if (!known)
+      independent_ = factor();
+    return independent_;
+  }
+
+  /// One coordinate of the displacements (per point, 0 where held), for changes of the averages; valid until the next
+  /// call.
+  template <class Changes>
+  const Eigen::VectorXd& displacements(const Changes& changes)
+  {
+    pull_ = changes;
+    factor_.solveInPlace(pull_);
+    moved_.setZero();
     for (Eigen::Index i = 0; i < c_.rows(); ++i)
       for (Averages::InnerIterator entry(c_, i); entry; ++entry)
-        if (isFree(static_cast<int>(entry.col())))
-          weighted_(i, entry.col()) = entry.value() / std::sqrt(mass[entry.col()]);
-    gram_.noalias() = weighted_ * weighted_.transpose();
+        moved_[entry.col()] += entry.value() * scale_[entry.col()] * pull_[i];
+    return moved_;
+  }
+
+private:
+  /// Factors C M^-1 C^T over the free points. Returns false if its rows depend on each other.
+  bool factor()
+  {
+    for (Eigen::Index i = 0; i < c_.rows(); ++i)
+    {
+      for (Averages::InnerIterator entry(c_, i); entry; ++entry)
+        row_[entry.col()] = entry.value() * scale_[entry.col()];
+      for (Eigen::Index k = 0; k < c_.rows(); ++k)
+      {
+        double sum = 0.0;
+        for (Averages::InnerIterator entry(c_, k); entry; ++entry)
+          sum += entry.value() * row_[entry.col()];
+        gram_(k, i) = sum;
+      }
+      for (Averages::InnerIterator entry(c_, i); entry; ++entry)
+        row_[entry.col()] = 0.0;
+    }
     const double scale = gram_.diagonal().maxCoeff();
     factor_.compute(gram_);
     for (Eigen::Index i = 0; i < c_.rows(); ++i)   // what is left of a row beside the others
@@ -44,23 +86,13 @@ public:
     return true;
   }
 
-  /// One coordinate of the displacements (per node, 0 where held), for changes of the averages; valid until the next
-  /// call.
-  template <class Changes>
-  const Eigen::VectorXd& displacements(const Changes& changes)
-  {
-    pull_ = changes;
-    factor_.solveInPlace(pull_);
-    for (Eigen::Index j = 0; j < c_.cols(); ++j)
-      moved_[j] = weighted_.col(j).dot(pull_) / std::sqrt((*mass_)[j]);
-    return moved_;
-  }
-
-private:
   const Averages& c_;
-  const Eigen::VectorXd* mass_ = nullptr;
-  Eigen::MatrixXd weighted_, gram_;
+  Eigen::VectorXd scale_;    ///< per point: 1 / mass, 0 where it is held
+  std::vector<char> free_;   ///< for which gram_ was factored
+  Eigen::VectorXd row_;      ///< one row of C M^-1
+  Eigen::MatrixXd gram_;
   Eigen::LDLT<Eigen::MatrixXd> factor_;
+  bool independent_ = false;
   Eigen::VectorXd pull_, moved_;
 };
 

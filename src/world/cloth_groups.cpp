@@ -8,60 +8,6 @@ namespace slender {
 
 namespace {
 
-/// All inputs of a cloth but its averages, which keep their memory.
-void takeInputs(const ClothInputs& from, ClothInputs& to)
-{
-  to.pins = from.pins;
-  to.gravity = from.gravity;
-  to.wind = from.wind;
-  to.forces = from.forces;
-}
-
-class LoneCloth : public StepGroup
-{
-public:
-  LoneCloth(const WorldModel& world, int cloth)
-    : world_(world),
-      cloth_(cloth),
-      stepper_(world.cloths[cloth].model, world.cloths[cloth].options)
-  {
-  }
-
-  StepReport step(WorldState& state, const WorldInputs& inputs) override
-  {
-    if (!tracks())
-      return stepper_.step(state.cloths[cloth_], inputs.cloths[cloth_], world_.time.step);
-    takeInputs(inputs.cloths[cloth_], tracked_inputs_);
-    clothTargets(world_, cloth_, state, inputs, tracked_inputs_.averages);
-    return stepper_.step(state.cloths[cloth_], tracked_inputs_, world_.time.step);
-  }
-  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override
-  {
-    if (tracks())
-      throw std::invalid_argument("a cloth that tracks a guide has no statics");
-    return stepper_.solveEquilibrium(state.cloths[cloth_], inputs.cloths[cloth_]);
-  }
-  void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override
-  {
-    if (tracks())
-      takeClothGuide(world_, cloth_, tracked_inputs_.averages, stepper_.averageForces(), inputs, state, report);
-  }
-  ClothEnergies clothEnergies(int, const ClothState& state, const Eigen::Vector3d& gravity) const override
-  {
-    return stepper_.energies(state, gravity);
-  }
-  const Eigen::Matrix3Xd& pinForces(int) const override { return stepper_.pinForces(); }
-  Eigen::Matrix3Xd clothContactForces(int) const override { return Eigen::Matrix3Xd(3, 0); }
-
-private:
-  bool tracks() const { return world_.cloths[cloth_].tracked.sets != nullptr; }
-
-  const WorldModel& world_;
-  int cloth_;
-  ClothStepper stepper_;
-  ClothInputs tracked_inputs_;   ///< those of the world, with the averages
-};
-
 class TouchingCloths : public StepGroup
 {
 public:
@@ -96,9 +42,10 @@ public:
     inputs_.cloths.resize(cloths_.size());
     for (std::size_t k = 0; k < cloths_.size(); ++k)
     {
-      takeInputs(inputs.cloths[cloths_[k]], inputs_.cloths[k]);
       if (tracks(k))
-        clothTargets(world_, cloths_[k], state, inputs, inputs_.cloths[k].averages);
+        trackedInputs(world_, cloths_[k], state, inputs, inputs_.cloths[k]);
+      else
+        inputs_.cloths[k] = inputs.cloths[cloths_[k]];
     }
     inputs_.solids.clear();
     for (const GraspTarget& obstacle : inputs.obstacles)
@@ -159,11 +106,6 @@ private:
 };
 
 }   // namespace
-
-std::unique_ptr<StepGroup> makeLoneCloth(const WorldModel& world, int cloth)
-{
-  return std::make_unique<LoneCloth>(world, cloth);
-}
 
 std::unique_ptr<StepGroup> makeTouchingCloths(const WorldModel& world, std::vector<int> cloths)
 {

@@ -43,11 +43,11 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   need(world.time.integrator != Integrator::symplectic_euler || !simulates,
        "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler "
        "(time.integrator)");
-  const bool may_join = !content.cloths.empty() || std::any_of(content.rods.begin(), content.rods.end(), [&](int r) {
-    return world.rods[r].contact.has_value();
-  }) || std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) {
-    return world.bodies[b].shape.has_value();
-  });
+  const auto touches = [](const auto& objects) { return [&](int k) { return objects[k].contact.has_value(); }; };
+  const bool may_join =
+      std::any_of(content.cloths.begin(), content.cloths.end(), touches(world.cloths)) ||
+      std::any_of(content.rods.begin(), content.rods.end(), touches(world.rods)) ||
+      std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return world.bodies[b].shape; });
   need(!touching_threads || !simulates || !may_join || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
@@ -62,6 +62,8 @@ IslandScheduler::IslandScheduler(const WorldModel& world, WorldContent content, 
 {
   for (const RodObject& rod : objects_.rods)
     nodes_ += rod.stepper->model->nodes();
+  for (const int c : objects_.content.cloths)
+    nodes_ += world.cloths[c].model->vertices();
   for (const WorldObject* object : objects_.all)
     reach_.push_back(object->reach());
   checkClearance(state);
@@ -102,19 +104,24 @@ Eigen::Matrix3Xd IslandScheduler::rodContactForces(int rod) const
 
 Eigen::Matrix3Xd IslandScheduler::clothContactForces(int cloth) const
 {
-  return contactForces(objects_.cloths[cloth], *objects_.cloths[cloth].part);
+  const ClothPart* part = objects_.cloths[cloth].part();
+  return part ? contactForces(objects_.cloths[cloth], *part) : Eigen::Matrix3Xd(3, 0);
 }
 
 // ---- statics
 
 StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
 {
-  if (!objects_.cloths.empty())
-    throw std::invalid_argument("cloth with contact has no statics");
   for (const RodObject& rod : objects_.rods)
     if (rod.constraints)
       throw std::invalid_argument("a rod that tracks a guide has no statics");
-  return solveStatics(objects_, loop_.threads, state, inputs);
+  StepReport total;
+  for (ClothObject& cloth : objects_.cloths)
+    if (total.ok)
+      total.merge(cloth.solveEquilibrium(state, inputs));
+  if (total.ok && !(objects_.rods.empty() && objects_.bodies.empty()))
+    total.merge(solveStatics(objects_, loop_.threads, state, inputs));
+  return total;
 }
 
 }   // namespace slender

@@ -25,8 +25,8 @@ public:
   IslandScheduler(const WorldModel& world, WorldContent content, WorldState& state);
 
   StepReport step(WorldState& state, const WorldInputs& inputs) override;
-  /// Of rods and bodies. Threads have no equilibrium: they stay where they are, and the others do not feel them.
-  /// Throws std::invalid_argument where there are cloths.
+  /// Of rods, bodies, and cloths that touch nothing. Threads have no equilibrium: they stay where they are, and the
+  /// others do not feel them. Throws std::invalid_argument if there are other cloths, or objects that track a guide.
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override;
   void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addContacts(std::vector<ContactForce>& out) const override;
@@ -40,12 +40,9 @@ public:
   RodStepper* stepper(int rod) override { return objects_.rods[rod].alone(); }
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
   {
-    return objects_.cloths[cloth].part->stages().energies(state, gravity);
+    return objects_.cloths[cloth].energies(state, gravity);
   }
-  const Eigen::Matrix3Xd& pinForces(int cloth) const override
-  {
-    return objects_.cloths[cloth].part->stages().pin_forces;
-  }
+  const Eigen::Matrix3Xd& pinForces(int cloth) const override { return objects_.cloths[cloth].pinForces(); }
   Eigen::Matrix3Xd clothContactForces(int cloth) const override;
 
 private:
@@ -62,7 +59,7 @@ private:
 
   const WorldModel& world_;
   WorldObjects objects_;
-  int nodes_ = 0;   ///< of its rods
+  int nodes_ = 0;   ///< of its rods, and vertices of its cloths
 
   IslandFinder finder_;
   std::vector<IslandFinder::Reach> reach_;           ///< per object

@@ -164,10 +164,8 @@ StepReport IslandScheduler::step(WorldState& state, const WorldInputs& inputs)
 
 void IslandScheduler::finish(WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
-  for (const RodObject& rod : objects_.rods)
-    rod.finishGuide(inputs, state, report);
-  for (const ThreadObject& thread : objects_.threads)
-    state.end_loads[thread.index] = thread.loads;
+  for (const WorldObject* object : objects_.all)
+    object->finishGuide(inputs, state, report);
 }
 
 void IslandScheduler::checkClearance(const WorldState& state)

@@ -193,6 +193,11 @@ void ObjectIsland::setStrands()
 
 StepReport ObjectIsland::step(double duration)
 {
+  if (std::optional<StepReport> own = objects_.size() == 1 ? objects_.front()->stepAlone() : std::nullopt)
+  {
+    stepped_ = own->ok;
+    return *own;
+  }
   double first = 0.0;
   for (const RodObject* rod : rods_)
     if (const double own = rod->stepper->work.next_step; own > 0.0)

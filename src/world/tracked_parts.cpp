@@ -26,12 +26,17 @@ const FunctionSet& functionsOf(const TrackedGuide& tracked, const ClothState& cl
   return tracked.sets->at(static_cast<std::size_t>(cloth.average_set));
 }
 
-void clothTargets(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
-                  Eigen::Matrix3Xd& targets)
+void trackedInputs(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
+                   ClothInputs& to)
 {
+  const ClothInputs& from = inputs.cloths[cloth];
+  to.pins = from.pins;
+  to.gravity = from.gravity;
+  to.wind = from.wind;
+  to.forces = from.forces;
   functionsOf(model.cloths[cloth].tracked, state.cloths[cloth])
-      .constraints->averages(guideOf(model, cloth, state, inputs), targets);
-  state.cloth_guides[cloth].blend.apply(static_cast<double>(state.steps + 1) * model.time.step, targets);
+      .constraints->averages(guideOf(model, cloth, state, inputs), to.averages);
+  state.cloth_guides[cloth].blend.apply(static_cast<double>(state.steps + 1) * model.time.step, to.averages);
 }
 
 TrackingError errorOf(const TrackedGuide& tracked, const ClothState& cloth, const GuideState& guide, double time,

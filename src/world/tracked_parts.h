@@ -8,10 +8,10 @@ namespace slender {
 /// Test functions in force of a tracked cloth.
 const FunctionSet& functionsOf(const TrackedGuide& tracked, const ClothState& cloth);
 
-/// What the averages of a tracked cloth shall be at the end of the step (3 x count [m]). A cloth that leads it has made
-/// its step before.
-void clothTargets(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
-                  Eigen::Matrix3Xd& targets);
+/// The inputs of a tracked cloth in the step: those of the world, and what its averages shall be at the end of the step
+/// (3 x count [m]). A cloth that leads it has made its step before.
+void trackedInputs(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
+                   ClothInputs& to);
 
 /// Distances of a tracked cloth from what its averages shall be.
 TrackingError errorOf(const TrackedGuide& tracked, const ClothState& cloth, const GuideState& guide, double time,

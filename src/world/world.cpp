@@ -24,9 +24,9 @@ namespace {
 
 using Kind = FailurePlace::Kind;
 
-bool meetsByBarrier(const WorldModel::Cloth& cloth)
+bool byImpulses(const WorldModel::Cloth& cloth)
 {
-  return cloth.contact && cloth.contact->method == ContactMethod::barrier;
+  return cloth.contact && cloth.contact->method == ContactMethod::impulses;
 }
 
 template <class Objects>
@@ -64,8 +64,8 @@ public:
       cloths(model.cloths.size())
   {
     checkThreads();
-    addCloths(true);
-    addCloths(false);
+    addLeaders(state);
+    addImpulses(false);
     addIslands(state);
     checkCloths(state);
   }
@@ -160,24 +160,39 @@ private:
     return groups_.back().get();
   }
 
-  /// Cloths that lead others, or those that do not. Leaders are stepped first, and feel only each other.
-  void addCloths(bool leaders)
+  /// The cloths that collide by impulses, or those that do not, among the cloths that lead others, or among the rest.
+  std::vector<int> clothsThat(bool lead, bool use_impulses) const
   {
-    std::vector<int> touching;
+    std::vector<int> found;
     for (int k = 0; k < static_cast<int>(model.cloths.size()); ++k)
-    {
-      if (model.leads(k) != leaders)
-        continue;
-      if (meetsByBarrier(model.cloths[k]))
-        barrier_cloths_.push_back(k);
-      else if (model.cloths[k].contact)
-        touching.push_back(k);
-      else
-        cloths[k] = {add(built(Kind::cloth, k, [&] { return makeLoneCloth(model, k); })), 0};
-    }
-    if (touching.empty())
-      return;
-    place(cloths, touching, add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); })));
+      if (model.leads(k) == lead && byImpulses(model.cloths[k]) == use_impulses)
+        found.push_back(k);
+    return found;
+  }
+
+  /// Cloths that lead others. They are stepped first, and feel only each other.
+  void addLeaders(WorldState& state)
+  {
+    addImpulses(true);
+    WorldContent content;
+    content.cloths = clothsThat(true, false);
+    if (!content.cloths.empty())
+      addScheduler(content, state);
+  }
+
+  void addImpulses(bool leaders)
+  {
+    const std::vector<int> touching = clothsThat(leaders, true);
+    if (!touching.empty())
+      place(cloths, touching, add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); })));
+  }
+
+  void addScheduler(const WorldContent& content, WorldState& state)
+  {
+    StepGroup* group =
+        add(built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); }));
+    place(rods, content.rods, group);
+    place(cloths, content.cloths, group);
   }
 
   void checkThreads() const
@@ -188,19 +203,21 @@ private:
       });
   }
 
-  /// Rods, threads, simulated bodies, and cloths whose contact is the barrier. In explicit steps of rods, threads and
-  /// cloths have a group of their own.
+  /// Rods, threads, simulated bodies, and cloths that do not collide by impulses. Rods that take explicit steps have
+  /// groups of their own.
   void addIslands(WorldState& state)
   {
     WorldContent content;
-    content.cloths = barrier_cloths_;
+    content.cloths = clothsThat(false, false);
     content.threads.resize(model.threads.size());
     std::iota(content.threads.begin(), content.threads.end(), 0);
     std::vector<int> alone;
     for (int r = 0; r < static_cast<int>(model.rods.size()); ++r)
       (meetsOthers(model, r) ? content.rods : alone).push_back(r);
     const std::vector<int> bodies = bodiesThatMeet();
-    const bool touching = !barrier_cloths_.empty() || anyTouches(model.threads);
+    const bool cloths_touch = std::any_of(content.cloths.begin(), content.cloths.end(),
+                                          [this](int k) { return model.cloths[k].contact.has_value(); });
+    const bool touching = cloths_touch || anyTouches(model.threads);
     if (touching || !content.rods.empty() ||
         std::any_of(bodies.begin(), bodies.end(), [this](int b) { return model.bodies[b].body.simulated; }))
       content.bodies = bodies;
@@ -214,7 +231,7 @@ private:
     separate_end_ = groups_.size();
     const bool shown = std::any_of(model.bodies.begin(), model.bodies.end(),
                                    [](const WorldModel::Body& body) { return body.shape.has_value(); });
-    const bool joined = !barrier_cloths_.empty() || (touching && (anyTouches(model.rods) || shown));
+    const bool joined = cloths_touch || (touching && (anyTouches(model.rods) || shown));
     if (explicit_steps && !joined)
     {
       if (!content.rods.empty() || !content.bodies.empty())
@@ -224,12 +241,8 @@ private:
       content.rods.clear();
       content.bodies.clear();
     }
-    if (content.rods.empty() && content.threads.empty() && content.bodies.empty() && content.cloths.empty())
-      return;
-    StepGroup* group =
-        add(built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); }));
-    place(rods, content.rods, group);
-    place(cloths, content.cloths, group);
+    if (!(content.rods.empty() && content.threads.empty() && content.bodies.empty() && content.cloths.empty()))
+      addScheduler(content, state);
   }
 
   /// Simulated ones, and driven ones that rods are welded to or that have a shape.
@@ -291,14 +304,13 @@ private:
       move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
   }
 
-  /// In the order in which they step: cloths that lead others, other cloths, rods that take explicit steps and meet
-  /// nothing, all others.
+  /// In the order in which they step: cloths that lead others, cloths that collide by impulses, rods that take explicit
+  /// steps and meet nothing, all others.
   std::vector<std::unique_ptr<StepGroup>> groups_;
   std::size_t separate_begin_ = 0, separate_end_ = 0;   ///< among them the rods that meet nothing
   int separate_nodes_ = 0;
-  std::vector<int> barrier_cloths_;   ///< whose contact is the barrier
-  std::vector<int> given_bodies_;     ///< driven bodies
-  WorldState before_;                 ///< a step that may fail in one of several groups
+  std::vector<int> given_bodies_;   ///< driven bodies
+  WorldState before_;               ///< a step that may fail in one of several groups
   GroupLoop separate_loop_;
 };
 

@@ -1,9 +1,8 @@
 #include "world_objects.h"
 
 #include <algorithm>
+#include <stdexcept>
 
-#include "meeting.h"
-#include "slender_sim/contact/solids.h"
 #include "slender_sim/world/world.h"
 
 namespace slender {
@@ -16,47 +15,18 @@ bool isSound(const GraspTarget& t)
          (!t.velocity || (t.velocity->linear.allFinite() && t.velocity->angular.allFinite()));
 }
 
-bool refuseInput(const std::string& what, StepReport& report)
+/// Calls make(). An std::invalid_argument becomes a WorldError of this object.
+template <class Make>
+void withPlace(FailurePlace::Kind kind, int index, const Make& make)
 {
-  report = StepReport();
-  report.ok = false;
-  report.failure = StepFailure::input_not_finite;
-  report.message = what + " is not finite or not valid; correct this input";
-  return false;
-}
-
-/// Whether a body touches solids, and there are any besides its own.
-bool meetsSolids(const WorldModel& world, int body)
-{
-  const std::optional<Shape>& shape = world.bodies[body].shape;
-  if (!shape || !hasBodySurface(*shape) || !(world.contact.gap > 0.0))
-    return false;
-  bool others = !world.obstacles.empty();
-  for (int b = 0; b < static_cast<int>(world.bodies.size()); ++b)
-    others = others || (b != body && world.bodies[b].shape);
-  return others;
-}
-
-bool touches(const WorldModel::Rod& rod) { return rod.contact.has_value(); }
-
-/// Null: the rod tracks nothing.
-std::shared_ptr<const WeakConstraints> constraintsOf(const WorldModel::Rod& rod)
-{
-  if (!rod.tracked.sets)
-    return nullptr;
-  const auto& constraints = rod.tracked.sets->front().constraints;
-  if (!constraints || constraints->count() == 0 || constraints->matrix().cols() != rod.model->nodes())
-    throw std::invalid_argument("rod '" + rod.model->name + "': averages of its " + std::to_string(rod.model->nodes()) +
-                                " nodes expected, at least one");
-  return constraints;
-}
-
-/// Throws std::invalid_argument if a rod cannot track its guide in these steps.
-void checkTracking(const TimeConfig& time, const std::string& rod)
-{
-  const std::string who = "rod '" + rod + "': ";
-  if (time.integrator != Integrator::implicit_euler || time.error_tolerance > 0)
-    throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler, with fixed steps");
+  try
+  {
+    make();
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw WorldError(kind, index, error.what());
+  }
 }
 
 /// The bodies, and the rods that may meet something.
@@ -69,35 +39,15 @@ WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
   return content;
 }
 
-/// Nodes made in one step have numbers that differ, as if the threads had been stepped one after the other.
-void renumber(std::vector<ThreadState>& threads, std::uint64_t before)
-{
-  std::uint64_t shift = 0;
-  for (ThreadState& thread : threads)
-  {
-    const std::uint64_t made = thread.next_id - before;
-    for (std::uint64_t& id : thread.id)
-      if (id >= before)
-        id += shift;
-    shift += made;
-    thread.next_id = before + shift;
-  }
-}
-
-std::uint64_t nextId(const std::vector<ThreadState>& threads)
-{
-  std::uint64_t next = 0;
-  for (const ThreadState& thread : threads)
-    next = std::max(next, thread.next_id);
-  return next;
-}
-
 }   // namespace
 
-bool meetsOthers(const WorldModel& world, int rod)
+bool refuseInput(const std::string& what, StepReport& report)
 {
-  return world.rods[rod].contact || std::any_of(world.welds.begin(), world.welds.end(),
-                                                [rod](const WorldModel::RodWeld& weld) { return weld.rod == rod; });
+  report = StepReport();
+  report.ok = false;
+  report.failure = StepFailure::input_not_finite;
+  report.message = what + " is not finite or not valid; correct this input";
+  return false;
 }
 
 // ---- what there is
@@ -127,207 +77,6 @@ WorldObjects::WorldObjects(const WorldObjects& other, const TimeConfig& time)
     follow(weld);
   if (touch())
     addSolids();
-}
-
-// ---- rods
-
-RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time)
-  : WorldObject(number),
-    whole(std::make_unique<RodStepper>(world.rods[number].model, time)),
-    stepper(&whole->impl()),
-    constraints(constraintsOf(world.rods[number])),
-    part(std::make_unique<RodPart>(*stepper, touches(world.rods[number]),
-                                   constraints ? &constraints->matrix() : nullptr)),
-    meets(meetsOthers(world, number)),
-    contact_(world.rods[number].contact),
-    guide_size_(world.rods[number].tracked.size),
-    duration_(world.time.step)
-{
-  if (constraints)
-    checkTracking(world.time, stepper->model->name);
-  if (contact_)
-    part->setContact(*contact_, world.rods[number].ignored);
-}
-
-bool RodObject::load(const WorldState& state, const WorldInputs& with, StepReport& report)
-{
-  stepper->begin(state.rods[index]);
-  part->begin(inputs, duration_);
-  if (!constraints)
-    return true;
-  constraints->averages(with.rod_guides[index], targets_);
-  if (!targets_.allFinite())
-    return refuseInput(name() + ": its guide", report);
-  part->averages()->begin(state.rods[index].x, targets_);
-  return true;
-}
-
-void RodObject::finishGuide(const WorldInputs& with, WorldState& state, StepReport& report) const
-{
-  if (!constraints)
-    return;
-  state.rod_guides[index].points = with.rod_guides[index];
-  state.rod_guides[index].forces = part->averages()->forces;
-  report.tracking_error =
-      std::max(report.tracking_error, constraints->error(targets_, state.rods[index].x) / guide_size_);
-}
-
-IslandFinder::Reach RodObject::reach() const
-{
-  const bool touches = contact_.has_value();
-  return {touches, touches && contact_->others, touches && contact_->solids, false, BoundingBox::empty()};
-}
-
-void RodObject::addTo(Meeting& meeting, const WorldState& state)
-{
-  if (!contact_)
-    return;
-  part->addSurface(meeting.surface);
-  meeting.add(name(), state.rods[index].x);
-}
-
-// ---- bodies
-
-BodyObject::BodyObject(const WorldModel& world, int number)
-  : WorldObject(number),
-    part(std::make_unique<BodyPart>(world.bodies[number].body)),
-    model_(world.bodies[number])
-{
-  if (!model_.shape)
-    return;
-  part->setReach(model_.X_BS.position.norm() + boundingRadius(*model_.shape));
-  if (meetsSolids(world, number))
-    part->setSurface(makeBodySurface(*model_.shape, model_.X_BS),
-                     model_.friction < 0.0 ? ContactProperties().friction : model_.friction);
-}
-
-bool BodyObject::load(const WorldState& state, const WorldInputs& inputs, StepReport&)
-{
-  part->begin(state.bodies[index], inputs.gravity);
-  return true;
-}
-
-IslandFinder::Reach BodyObject::reach() const
-{
-  return {part->hasSurface(), false, part->hasSurface(), model_.shape.has_value(), BoundingBox::empty()};
-}
-
-void BodyObject::addTo(Meeting& meeting, const WorldState& state)
-{
-  if (!part->hasSurface())
-    return;
-  static_cast<const Part&>(*part).addSurface(meeting.surface);
-  meeting.add(name(), part->surfaceAt(state.bodies[index].X_WB));
-}
-
-// ---- cloths
-
-ClothObject::ClothObject(const WorldModel& world, int number, const TimeConfig& time)
-  : WorldObject(number),
-    part(std::make_unique<ClothPart>(world.cloths[number].model, world.cloths[number].options)),
-    contact_(*world.cloths[number].contact),
-    duration_(world.time.step)
-{
-  part->setContact(contact_, time.step, world.cloths[number].ignored);
-}
-
-bool ClothObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
-{
-  const ClothState& from = state.cloths[index];
-  const ClothInputs& with = inputs.cloths[index];
-  if (!part->accepts(from, with, duration_, report))
-    return false;
-  part->begin(from, with, duration_);
-  return true;
-}
-
-IslandFinder::Reach ClothObject::reach() const
-{
-  return {true, contact_.others, contact_.solids, false, BoundingBox::empty()};
-}
-
-void ClothObject::addTo(Meeting& meeting, const WorldState& state)
-{
-  part->setPins(state.cloths[index].pins);
-  part->addSurface(meeting.surface);
-  meeting.add(name(), state.cloths[index].x);
-}
-
-// ---- threads
-
-bool ThreadObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
-{
-  inputs_ = still_ = inputs.threads[index];
-  still_.flow_rate = 0.0;
-  work_ = state.threads[index];
-  makeStrands(work_.threads.size());
-  const std::uint64_t next_id = nextId(work_.threads);
-  for (std::size_t s = 0; s < work_.threads.size(); ++s)
-  {
-    ThreadState& strand = work_.threads[s];
-    strand.next_id = next_id;
-    if (!strands_[s].stepper->begin(strand, strand.ends[1].held ? inputs_ : still_, time_.step, report))
-      return false;
-    strands_[s].part->setDuration(time_.step);
-  }
-  return true;
-}
-
-void ThreadObject::makeStrands(std::size_t count)
-{
-  while (strands_.size() < count)
-  {
-    Strand added;
-    added.stepper = std::make_unique<ThreadStepper::Impl>(model.model, time_.newton, false);
-    added.part = std::make_unique<ThreadPart>(*added.stepper);
-    if (model.contact)
-      added.part->setContact(*model.contact, model.merging, index);
-    strands_.push_back(std::move(added));
-  }
-}
-
-void ThreadObject::addParts(std::vector<Part*>& parts)
-{
-  for (std::size_t s = 0; s < strands(); ++s)
-    parts.push_back(strands_[s].part.get());
-}
-
-IslandFinder::Reach ThreadObject::reach() const
-{
-  const auto& contact = model.contact;
-  return {contact.has_value(), contact && contact->others, contact && contact->solids, false, BoundingBox::empty()};
-}
-
-void ThreadObject::finish(WorldState& state)
-{
-  loads = {};
-  const std::uint64_t before = nextId(work_.threads);
-  for (std::size_t s = 0; s < work_.threads.size(); ++s)
-  {
-    ThreadState& strand = work_.threads[s];
-    std::swap(strand, strands_[s].stepper->work);
-    for (int end = 0; end < 2; ++end)
-      if (strand.ends[end].held)
-        loads[end] = strands_[s].stepper->loads[end];
-  }
-  renumber(work_.threads, before);
-  breakThreads(work_, model.model->limits);
-  dropThreads(work_, model.model->limits);
-  std::swap(state.threads[index], work_);
-}
-
-void ThreadObject::addTo(Meeting& meeting, const WorldState& state)
-{
-  if (!model.contact)
-    return;
-  const std::vector<ThreadState>& threads = state.threads[index].threads;
-  makeStrands(threads.size());
-  for (std::size_t s = 0; s < threads.size(); ++s)
-  {
-    strands_[s].stepper->work = threads[s];
-    strands_[s].part->addSurface(meeting.surface);
-    meeting.add(name(), Eigen::Map<const Eigen::Matrix3Xd>(threads[s].x.front().data(), 3, threads[s].nodes()));
-  }
 }
 
 // ---- solids
@@ -360,18 +109,9 @@ void WorldObjects::addObjects(const TimeConfig& time)
     if (world.bodies[b].body.simulated)
       add(bodies.emplace_back(world, b));
   for (const int r : content.rods)
-  {
-    try
-    {
-      add(rods.emplace_back(world, r, time));
-    }
-    catch (const std::invalid_argument& error)
-    {
-      throw WorldError(FailurePlace::Kind::rod, r, error.what());
-    }
-  }
+    withPlace(FailurePlace::Kind::rod, r, [&] { add(rods.emplace_back(world, r, time)); });
   for (const int c : content.cloths)
-    add(cloths.emplace_back(world, c, time));
+    withPlace(FailurePlace::Kind::cloth, c, [&] { add(cloths.emplace_back(world, c)); });
   for (const int k : content.threads)
     add(threads.emplace_back(world, k));
 }

@@ -1,161 +1,18 @@
 #pragma once
 
-#include <array>
 #include <deque>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "cloth/cloth_part.h"
-#include "island/island.h"
-#include "rod/rod_part.h"
-#include "thread/thread_part.h"
-#include "island_finder.h"
+#include "body_object.h"
+#include "cloth_object.h"
+#include "rod_object.h"
+#include "thread_object.h"
 #include "slender_sim/world/world_model.h"
 #include "slender_sim/world/world_state.h"
 
 /// The objects of a world, and the solids that they meet, as islands of them share them.
 namespace slender {
-
-struct Meeting;
-
-/// A rod, a thread, a cloth or a simulated body: something of which an island has parts.
-class WorldObject
-{
-public:
-  explicit WorldObject(int number) : index(number) {}
-  virtual ~WorldObject() = default;
-  WorldObject(const WorldObject&) = delete;
-  WorldObject& operator=(const WorldObject&) = delete;
-
-  const int index;   ///< among the objects of its kind in the world
-  int place = 0;     ///< in WorldObjects::all
-
-  /// For messages: "rod 'rope'".
-  virtual std::string name() const = 0;
-  /// Loads the state where a step begins. Returns false, and fills the report, if the state or the inputs are not
-  /// valid.
-  virtual bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) = 0;
-  /// Appends its parts of the present step, once the object is loaded.
-  virtual void addParts(std::vector<Part*>& parts) = 0;
-  /// What it may touch; without a box.
-  virtual IslandFinder::Reach reach() const = 0;
-  /// Writes the end of the step into the state.
-  virtual void finish(WorldState& state) = 0;
-  /// Of the barrier in the island that had the object last [N].
-  virtual double& stiffness(WorldState& state) const = 0;
-  /// Appends its surface in a state, if it has one.
-  virtual void addTo(Meeting& meeting, const WorldState& state) = 0;
-  bool hasSurface() const { return reach().has_points; }
-};
-
-class RodObject final : public WorldObject
-{
-public:
-  RodObject(const WorldModel& world, int number, const TimeConfig& time);
-  std::string name() const override { return "rod '" + stepper->model->name + "'"; }
-  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
-  IslandFinder::Reach reach() const override;
-  void finish(WorldState& state) override { state.rods[index] = stepper->work; }
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.rods[index]; }
-  void addTo(Meeting& meeting, const WorldState& state) override;
-
-  /// Null: it may meet others, or tracks a guide.
-  RodStepper* alone() { return meets || constraints ? nullptr : whole.get(); }
-  /// Writes the guide and its forces into the state after a step, if the rod tracks a guide.
-  void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const;
-
-  const std::unique_ptr<RodStepper> whole;
-  RodStepper::Impl* const stepper;                            ///< of `whole`
-  const std::shared_ptr<const WeakConstraints> constraints;   ///< null: tracks nothing
-  const std::unique_ptr<RodPart> part;
-  RodInputs inputs;   ///< of the present step, with the targets of grasps that driven bodies carry
-  const bool meets;   ///< contact or welds may let it meet others
-
-private:
-  const std::optional<ContactProperties>& contact_;
-  Eigen::Matrix3Xd targets_;   ///< of its averages at the end of the step [m]
-  const double guide_size_;    ///< [m]
-  const double duration_;      ///< of a step [s]
-};
-
-/// A simulated body.
-class BodyObject final : public WorldObject
-{
-public:
-  BodyObject(const WorldModel& world, int number);
-  std::string name() const override { return "body '" + model_.body.name + "'"; }
-  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
-  IslandFinder::Reach reach() const override;
-  void finish(WorldState& state) override { state.bodies[index] = part->state(); }
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.bodies[index]; }
-  void addTo(Meeting& meeting, const WorldState& state) override;
-
-  const std::unique_ptr<BodyPart> part;
-
-private:
-  const WorldModel::Body& model_;
-};
-
-/// A thread, with what has broken off it.
-class ThreadObject final : public WorldObject
-{
-public:
-  ThreadObject(const WorldModel& world, int number)
-    : WorldObject(number),
-      model(world.threads[number]),
-      time_(world.time)
-  {
-  }
-  std::string name() const override { return "thread '" + model.model->name + "'"; }
-  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addParts(std::vector<Part*>& parts) override;
-  IslandFinder::Reach reach() const override;
-  void finish(WorldState& state) override;
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.threads[index]; }
-  void addTo(Meeting& meeting, const WorldState& state) override;
-
-  struct Strand
-  {
-    std::unique_ptr<ThreadStepper::Impl> stepper;
-    std::unique_ptr<ThreadPart> part;
-  };
-  /// Strands of the present step.
-  std::size_t strands() const { return work_.threads.size(); }
-  Strand& strand(std::size_t number) { return strands_[number]; }
-
-  const WorldModel::Thread& model;
-  std::array<EndLoad, 2> loads;   ///< of the last step
-
-private:
-  void makeStrands(std::size_t count);
-
-  const TimeConfig& time_;
-  std::vector<Strand> strands_;   ///< as many as there have ever been at once
-  ThreadInputs inputs_, still_;   ///< of the present step; without flow, for what has broken off
-  ThreadGroupState work_;
-};
-
-class ClothObject final : public WorldObject
-{
-public:
-  ClothObject(const WorldModel& world, int number, const TimeConfig& time);
-  std::string name() const override { return "cloth '" + part->stages().model->name + "'"; }
-  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
-  IslandFinder::Reach reach() const override;
-  void finish(WorldState& state) override { part->end(state.cloths[index]); }
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.cloths[index]; }
-  void addTo(Meeting& meeting, const WorldState& state) override;
-
-  const std::unique_ptr<ClothPart> part;
-
-private:
-  const ContactProperties& contact_;
-  const double duration_;   ///< of a step [s]
-};
 
 /// A solid that parts may touch.
 struct WorldSolid
@@ -184,9 +41,6 @@ struct WorldContent
   std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
   std::vector<int> cloths;   ///< whose contact is the barrier
 };
-
-/// Returns true if contact or welds may let a rod meet something.
-bool meetsOthers(const WorldModel& world, int rod);
 
 struct WorldObjects
 {

@@ -1,4 +1,5 @@
-// Prescribed averages of rods: alone, beside contact and welds, and in islands with each other kind of object.
+// Prescribed averages of rods and cloths: alone, beside contact and welds, and in islands with each other kind of
+// object.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -166,6 +167,22 @@ rods:
             - [0.04, -0.02, 0, 0.002, 0, 0.001, 0.004, 0.02, 0, 0.003]
 )";
 
+/// A towel whose guide lifts it likewise.
+const std::string kLiftedTowel = R"(
+time: {step: 0.001, duration: 1}
+gravity: [0, 0, 0]
+contact: {gap: 5.0e-5}
+tracked:
+  - name: towel
+    guide:
+      grid: {corner: [-0.02, -0.02, 0.0008], sides: [[0.04, 0, 0], [0, 0.04, 0]], cells: 8, pattern: alternating}
+      motion: {topic: points}
+    mesh: same
+    test_functions: {clusters: {count: 5}}
+    material: {area_density: 0.2, thickness: 0.0004, youngs_modulus: 2.0e5, poissons_ratio: 0.3}
+    contact: {friction: 0.3, thickness: 0.0004, method: barrier}
+)";
+
 const char* const kRod = R"(
   - name: other
     centerline: {straight: {from: [0.001, -0.02, 0.0024], to: [0.001, 0.02, 0.0024], edges: 20}}
@@ -234,42 +251,74 @@ struct Other
 };
 void PrintTo(const Other& other, std::ostream* out) { *out << other.name; }
 
-class TrackedRodMeets : public testing::TestWithParam<Other>
-{};
-
-/// The averages stay exact. Only the forces of the guides change the total momentum.
-TEST_P(TrackedRodMeets, AndAveragesAreExact)
+/// Lifts what tracks a guide into what lies above. The averages stay exact. Only the forces of the guides change the
+/// total momentum, if there is no obstacle.
+void lift(const std::string& scene, bool touches)
 {
-  Simulation s(parseScene(kLifted + GetParam().scene, "lifted"));
-  const bool welded = GetParam().scene == kWelded;
+  Simulation s(parseScene(scene, "lifted"));
+  const bool isolated = s.config().obstacles.empty();
+  SceneInputs inputs = s.defaultInputs();
+  const std::vector<Matrix3Xd> guides = inputs.guides;
   std::size_t contacts = 0;
   double largest = 0.0;
   for (int k = 0; k < 60; ++k)
   {
+    inputs = s.defaultInputs();
+    for (std::size_t c = 0; c < guides.size(); ++c)
+      for (Eigen::Index i = 0; i < guides[c].cols(); ++i)
+        inputs.guides[c](2, i) = guides[c](2, i) + 5e-5 * (k + 1) * (1.0 + 25.0 * guides[c](0, i));
     const Vector3d before = momentum(s);
-    const StepReport report = s.step(s.defaultInputs());
+    const StepReport report = s.step(inputs);
     ASSERT_TRUE(report.ok) << k << ": " << report.message;
     contacts = std::max(contacts, s.world().contacts().size());
     Vector3d force = Vector3d::Zero();
+    const auto add = [&](const Matrix3Xd& forces) {
+      force += forces.rowwise().sum();
+      largest = std::max(largest, forces.cwiseAbs().maxCoeff());
+    };
     for (std::size_t r = 0; r < s.state().rods.size(); ++r)
     {
       ASSERT_LT(s.rodTrackingError(static_cast<int>(r)), 1e-10 * 0.04) << k;
       if (s.config().rods[r].tracking)
-      {
-        force += guideForce(s, static_cast<int>(r));
-        largest = std::max(largest, s.state().rod_guides[r].forces.cwiseAbs().maxCoeff());
-      }
+        add(s.state().rod_guides[r].forces);
     }
+    for (std::size_t c = 0; c < s.state().cloths.size(); ++c)
+      if (s.config().cloths[c].tracking)
+      {
+        ASSERT_LT(s.trackingError(static_cast<int>(c)).met, 1e-10 * 0.04) << k;
+        add(s.state().cloth_guides[c].forces);
+      }
     // Newton's method leaves up to this part of the largest force unbalanced
-    EXPECT_LT((momentum(s) - before - 0.001 * force).norm(), 1e-5 * 0.001 * largest) << k;
+    EXPECT_TRUE(!isolated || (momentum(s) - before - 0.001 * force).norm() < 1e-5 * 0.001 * largest) << k;
   }
   EXPECT_GT(largest, 1e-4);
-  EXPECT_TRUE(welded || contacts >= 1);
+  EXPECT_TRUE(!touches || contacts >= 1);
 }
+
+class TrackedRodMeets : public testing::TestWithParam<Other>
+{};
+
+TEST_P(TrackedRodMeets, AndAveragesAreExact) { lift(kLifted + GetParam().scene, GetParam().scene != kWelded); }
+
+class TrackedClothMeets : public testing::TestWithParam<Other>
+{};
+
+TEST_P(TrackedClothMeets, AndAveragesAreExact) { lift(kLiftedTowel + GetParam().scene, true); }
 
 INSTANTIATE_TEST_SUITE_P(EachKind, TrackedRodMeets,
                          testing::Values(Other{"Rod", kRod}, Other{"TrackedRod", kTrackedRod}, Other{"Thread", kThread},
                                          Other{"Cloth", kCloth}, Other{"Body", kBall}, Other{"WeldedBody", kWelded}),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+const char* const kLid = R"(
+obstacles:
+  - {name: lid, shape: {box: {size: [0.01, 0.01, 0.01]}}, pose: {position: [0, 0, 0.0065]}, friction: 0.3}
+)";
+
+INSTANTIATE_TEST_SUITE_P(EachKind, TrackedClothMeets,
+                         testing::Values(Other{"Rod", std::string("rods:") + kRod},
+                                         Other{"TrackedRod", "rods:" + kTrackedRod}, Other{"Thread", kThread},
+                                         Other{"Cloth", kCloth}, Other{"Body", kBall}, Other{"Obstacle", kLid}),
                          [](const auto& info) { return std::string(info.param.name); });
 
 #ifdef SLENDER_COUNTS_ALLOCATIONS

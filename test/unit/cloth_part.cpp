@@ -455,7 +455,14 @@ TEST(ClothPart, RefusesWhatItCannotSolve)
   Eigen::SparseMatrix<double, Eigen::RowMajor> weights(1, tracking.vertices());
   weights.insert(0, 3) = 1.0;
   tracking.averages.push_back({std::make_shared<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(weights), {}});
-  EXPECT_NE(messageOf(tracking, {}).find("tracks a guide"), std::string::npos);
+  EXPECT_EQ(messageOf(tracking, {}), "");
+  tracking.averages[0].bounds = Eigen::VectorXd::Constant(1, 2.0);
+  o = {};
+  o.one_newton_step = true;
+  EXPECT_NE(messageOf(tracking, o).find("max_traction"), std::string::npos);
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> many(501, tracking.vertices());
+  tracking.averages[0] = {std::make_shared<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(many), {}};
+  EXPECT_NE(messageOf(tracking, {}).find("at most 500 averages"), std::string::npos);
 
   ClothPart part(cloth.model, {});
   ClothInputs inputs = cloth.inputs;

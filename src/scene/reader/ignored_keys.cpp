@@ -58,15 +58,12 @@ void warnOfWind(const YamlCursor& wind, const SceneConfig& scene)
 
 bool isSimulatedSolid(const BodyConfig& body) { return body.contact && body.shape && !body.motion; }
 
-/// Whether a body touches obstacles and other bodies.
-bool touchesSolids(const BodyConfig& body) { return isSimulatedSolid(body) && hasBodySurface(*body.shape); }
-
 /// An obstacle that nothing touches is of use only as the frame that grasps follow.
 void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact && object.contact->solids; };
   if (any(scene.rods, touches) || any(scene.threads, touches) || any(scene.cloths, touches) ||
-      any(scene.bodies, touchesSolids))
+      any(scene.bodies, isSimulatedSolid))
     return;
   const auto follows = [&scene](const std::string& name) {
     const auto by_grasp = [&name](const GraspConfig& grasp) {
@@ -141,7 +138,8 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
   if (!others.empty())
   {
     cloths.warning(
-        "that have contact: {method: impulses}, or track a guide, pass through the " + joinWords(others) +
+        "that have contact: {method: impulses}, have a max_traction, or are guides, pass through the " +
+        joinWords(others) +
         " of this scene: such contact is with cloth of this kind, obstacles, and bodies with a given motion");
   }
 }
@@ -151,9 +149,11 @@ std::string whyNoFriction(const SceneConfig& scene)
 {
   const auto touches = [](const auto& object) { return object.contact && object.contact->solids; };
   const auto slips = [&touches](const auto& object) { return touches(object) && object.contact->friction > 0; };
-  const auto body_slips = [](const BodyConfig& body) { return touchesSolids(body) && body.friction.value_or(1.0) > 0; };
+  const auto body_slips = [](const BodyConfig& body) {
+    return isSimulatedSolid(body) && body.friction.value_or(1.0) > 0;
+  };
   if (!any(scene.rods, touches) && !any(scene.threads, touches) && !any(scene.cloths, touches) &&
-      !any(scene.bodies, touchesSolids))
+      !any(scene.bodies, isSimulatedSolid))
     return "nothing touches it; give the rods, threads or cloths a contact with obstacles, or leave friction out";
   if (!any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.cloths, slips) &&
       !any(scene.bodies, body_slips))
@@ -174,7 +174,9 @@ void warnOfFriction(const YamlCursor& friction, const std::string& why)
 void warnOfSlipSpeed(const YamlCursor& slip_speed, const SceneConfig& scene)
 {
   const auto slips = [](const auto& object) { return object.contact && object.contact->friction > 0; };
-  const auto body_slips = [](const BodyConfig& body) { return touchesSolids(body) && body.friction.value_or(1.0) > 0; };
+  const auto body_slips = [](const BodyConfig& body) {
+    return isSimulatedSolid(body) && body.friction.value_or(1.0) > 0;
+  };
   if (slip_speed.present() && !any(scene.rods, slips) && !any(scene.threads, slips) && !any(scene.bodies, body_slips))
   {
     slip_speed.warning(
@@ -204,12 +206,10 @@ void warnOfMaterial(YamlMap material, const Eigen::Vector3d& gravity)
 /// `others`: whether there are obstacles or other bodies with a shape.
 void warnOfBodyShape(const YamlCursor& shape, const BodyConfig& config, bool others)
 {
-  if (isSimulatedSolid(config) && !touchesSolids(config) && others)
+  if (isSimulatedSolid(config) && std::holds_alternative<Cylinder>(*config.shape) && others)
   {
-    shape.warning(
-        "passes through obstacles, and through other bodies whose shape is a cylinder or a mesh: of simulated bodies "
-        "spheres, boxes and capsules touch them; rods, threads and cloths touch it. Take one of these shapes, or "
-        "contact: false");
+    shape.warning("touches obstacles and other bodies as a prism of " + std::to_string(kSidesOfCylinder) +
+                  " sides; rods, threads and cloths touch the cylinder itself");
   }
 }
 

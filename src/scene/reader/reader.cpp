@@ -115,12 +115,24 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
     check(scene.cloths[k].grasps, cloths[k], "cloth follows obstacles and driven bodies only");
 }
 
+/// Returns why the contact of a cloth cannot be the barrier; empty: it can.
+std::string whyNoBarrier(const SceneConfig& scene, std::size_t k)
+{
+  for (const ClothConfig& cloth : scene.cloths)
+  {
+    const auto* guide = cloth.tracking ? std::get_if<ClothGuide>(&cloth.tracking->guide.motion) : nullptr;
+    if (guide && guide->cloth == static_cast<int>(k))
+      return "is the guide of cloth " + cloth.name;
+  }
+  const auto& tracking = scene.cloths[k].tracking;
+  return tracking && tracking->sets[0].bounds.size() > 0 ? "has a max_traction" : "";
+}
+
 /// Sets the method of contact of each cloth that does not name one. Impulses are cheap, but let cloth meet nothing else
-/// than cloth and what moves as prescribed. Cloths that track a guide, and their guides, have no other method.
+/// than cloth and what moves as prescribed.
 void chooseContactMethods(const std::vector<YamlCursor>& cloths, const std::vector<ReadRod>& rods, SceneConfig& scene)
 {
   const auto method = [&](std::size_t k) { return YamlMap(YamlMap(cloths[k]).find("contact")).find("method"); };
-  std::vector<char> tracks(cloths.size(), 0);
   bool others =
       std::any_of(rods.begin(), rods.end(), [](const ReadRod& rod) { return rod.config.contact.has_value(); });
   for (const ThreadConfig& thread : scene.threads)
@@ -131,21 +143,17 @@ void chooseContactMethods(const std::vector<YamlCursor>& cloths, const std::vect
   {
     const ClothConfig& cloth = scene.cloths[k];
     others = others || (cloth.contact && method(k).present() && cloth.contact->method == ContactMethod::barrier);
-    if (!cloth.tracking)
-      continue;
-    tracks[k] = 1;
-    if (const auto* guide = std::get_if<ClothGuide>(&cloth.tracking->guide.motion))
-      tracks[guide->cloth] = 1;
   }
   for (std::size_t k = 0; k < cloths.size(); ++k)
   {
     if (!scene.cloths[k].contact)
       continue;
     ContactMethod& chosen = scene.cloths[k].contact->method;
+    const std::string why_not = whyNoBarrier(scene, k);
     if (!method(k).present())
-      chosen = others && !tracks[k] ? ContactMethod::barrier : ContactMethod::impulses;
-    else if (tracks[k] && chosen == ContactMethod::barrier)
-      method(k).problem("is not for cloth that tracks a guide, or is one; must be impulses");
+      chosen = others && why_not.empty() ? ContactMethod::barrier : ContactMethod::impulses;
+    else if (!why_not.empty() && chosen == ContactMethod::barrier)
+      method(k).problem("must be impulses, because this cloth " + why_not);
   }
 }
 
@@ -164,7 +172,7 @@ void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cl
           " is simulated, and contact by impulses does not push bodies; give the "
           "body a motion or contact: false, or the "
           "cloth contact: {obstacles: false}" +
-          (scene.cloths[k].tracking ? "" : " or contact: {method: barrier}"));
+          (whyNoBarrier(scene, k).empty() ? " or contact: {method: barrier}" : ""));
     }
   }
 }

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cloth/cloth_part.h"
+#include "slender_sim/cloth/cloth_stepper.h"
+#include "world_object.h"
+
+namespace slender {
+
+/// A cloth that touches nothing or whose contact is the barrier. Its own stepper advances a cloth that touches nothing,
+/// and offers all integrators and solvers of cloth.
+class ClothObject final : public WorldObject
+{
+public:
+  ClothObject(const WorldModel& world, int number);
+  std::string name() const override { return "cloth '" + model_.model->name + "'"; }
+  bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
+  void addParts(std::vector<Part*>& parts) override;
+  std::optional<StepReport> stepAlone() override;
+  IslandFinder::Reach reach() const override;
+  void finish(WorldState& state) override;
+  void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const override;
+  double& stiffness(WorldState& state) const override { return state.contact_stiffness.cloths[index]; }
+  void addTo(Meeting& meeting, const WorldState& state) override;
+
+  /// Null: the cloth touches nothing.
+  const ClothPart* part() const { return part_.get(); }
+  /// Throws std::invalid_argument for a cloth that touches something or tracks a guide.
+  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs);
+  const Eigen::Matrix3Xd& pinForces() const;
+  ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
+
+private:
+  bool tracks() const { return model_.tracked.sets != nullptr; }
+
+  const WorldModel& world_;
+  const WorldModel::Cloth& model_;
+  std::unique_ptr<ClothPart> part_;
+  std::unique_ptr<ClothStepper> stepper_;   ///< null: part_ is not
+  ClothState work_;                         ///< of stepper_
+  const ClothInputs* inputs_ = nullptr;     ///< of the present step
+  ClothInputs tracked_inputs_;              ///< those of the world, with the averages
+};
+
+}   // namespace slender
