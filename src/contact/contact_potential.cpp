@@ -219,8 +219,7 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
                   Eigen::Vector3d::Zero(),
                   s.object,
                   -1};
-  if (const int carrier = surface.objects[s.object].carrier; carrier >= 0)
-    contact.own = poses[carrier].inverse() * contact.position;
+  setOwn(contact, poses);
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 

@@ -68,8 +68,14 @@ private:
                     bool with_stiffness);
   double addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness);
-  double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const Pose& pose,
+  double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const std::vector<Pose>& poses,
                          bool with_stiffness);
+  /// Where the body that carries the first piece is touched, for friction.
+  void setOwn(Contact& contact, const std::vector<Pose>& poses) const
+  {
+    if (const int carrier = surface.objects[contact.object].carrier; carrier >= 0)
+      contact.own = poses[carrier].inverse() * contact.position;
+  }
   /// `scale`: of the gap at which the pair repels.
   double addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
   void addMotion(const PairGap& gap, const Contact& contact, double force, double own);

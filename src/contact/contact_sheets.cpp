@@ -15,7 +15,7 @@ double ContactPotential::Impl::addSheets(const Eigen::Matrix3Xd& x, const std::v
     if (energy += addSheetPair(x, pair, with_stiffness); !std::isfinite(energy))
       return kInfinity;
   for (const SheetCandidates::OnSolid& on : near_.sheets().onSolids())
-    if (energy += addSheetOnSolid(x, on, poses[on.solid], with_stiffness); !std::isfinite(energy))
+    if (energy += addSheetOnSolid(x, on, poses, with_stiffness); !std::isfinite(energy))
       return kInfinity;
   return energy;
 }
@@ -72,8 +72,9 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
 }
 
 double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
-                                               const Pose& pose, bool with_stiffness)
+                                               const std::vector<Pose>& poses, bool with_stiffness)
 {
+  const Pose& pose = poses[on.solid];
   const SheetPieces::Face& face = on.face;
   const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
@@ -101,6 +102,7 @@ double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const 
   gap.normal = pose.orientation * gap.normal;
   contact.object = face.object;
   contact.other = -1;
+  setOwn(contact, poses);
   return addContact(gap, contact, 1.0, with_stiffness);
 }
 

@@ -83,7 +83,7 @@ Eigen::Vector3d BodyPart::move(int point) const
   return direction.head<3>() + direction.tail<3>().cross(position(point) - system.pose.position);
 }
 
-/// Its segments touch solids alone: rods, threads and cloths touch the solid of the body.
+/// Its pieces touch solids alone: rods, threads and cloths touch the solid of the body.
 void BodyPart::addSurface(ContactSurface& surface) const
 {
   if (!hasSurface())
@@ -91,6 +91,8 @@ void BodyPart::addSurface(ContactSurface& surface) const
   const int first = surface.points, object = static_cast<int>(surface.objects.size());
   for (const BodySurface::Segment& s : surface_.segments)
     surface.segments.push_back({first + s.a, first + s.b, s.radius, object, 0.0, 0.0});
+  for (const std::array<int, 3>& t : surface_.triangles)
+    surface.triangles.push_back({{first + t[0], first + t[1], first + t[2]}, surface_.radius, object, 0});
   surface.points += points();
   ContactObject own;
   own.self = own.others = false;

@@ -41,7 +41,7 @@ public:
   Eigen::Matrix3Xd surfaceAt(const Pose& pose) const;
   /// Number of the body's solid in the contact that addSurface() is for.
   void setCarrier(int solid) { carrier_ = solid; }
-  bool hasSurface() const { return !surface_.segments.empty(); }
+  bool hasSurface() const { return !surface_.empty(); }
   const Pose& pose() const override { return system.pose; }
   void addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const override;
   void addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force) override;

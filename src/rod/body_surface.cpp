@@ -1,6 +1,9 @@
 #include "body_surface.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
+#include <variant>
 
 namespace slender {
 
@@ -16,40 +19,77 @@ BodySurface capsule(double radius, double length)
   return out;
 }
 
-BodySurface edgesOf(const Box& box)
+constexpr double kRounding = 1e-3;   // of the shortest side
+
+/// Bit k of the number of a corner tells on which side it is along axis k.
+BodySurface facesOf(const Box& box)
 {
-  constexpr double kRounding = 0.05;   // of the shortest side
   BodySurface out;
-  const double radius = kRounding * box.size.minCoeff();
-  const Eigen::Vector3d half = 0.5 * box.size.array() - radius;
+  out.radius = kRounding * box.size.minCoeff();
+  const Eigen::Vector3d half = 0.5 * box.size.array() - out.radius;
   out.points.resize(3, 8);
   for (int i = 0; i < 8; ++i)
     for (int k = 0; k < 3; ++k)
       out.points(k, i) = i >> k & 1 ? half[k] : -half[k];
-  for (int i = 0; i < 8; ++i)
-    for (int k = 0; k < 3; ++k)
-      if (!(i >> k & 1))
-        out.segments.push_back({i, i | 1 << k, radius});
+  for (int k = 0; k < 3; ++k)
+    for (int side = 0; side < 2; ++side)
+    {
+      const int first = side << k, u = 1 << (k + 1) % 3, v = 1 << (k + 2) % 3;
+      out.triangles.push_back({first, first | u, first | u | v});
+      out.triangles.push_back({first, first | u | v, first | v});
+    }
+  return out;
+}
+
+BodySurface facesOf(const Cylinder& cylinder)
+{
+  BodySurface out;
+  out.radius = kRounding * std::min(2.0 * cylinder.radius, cylinder.length);
+  const int n = kSidesOfCylinder;
+  out.points.resize(3, 2 * n);
+  for (int i = 0; i < n; ++i)
+  {
+    const double angle = 2.0 * M_PI * i / n;
+    const Eigen::Vector2d rim = (cylinder.radius - out.radius) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    out.points.col(i) << rim, -0.5 * cylinder.length + out.radius;
+    out.points.col(n + i) << rim, 0.5 * cylinder.length - out.radius;
+    const int next = (i + 1) % n;
+    out.triangles.push_back({i, next, n + next});
+    out.triangles.push_back({i, n + next, n + i});
+    if (i > 0 && next > 0)
+    {
+      out.triangles.push_back({0, next, i});
+      out.triangles.push_back({n, n + i, n + next});
+    }
+  }
+  return out;
+}
+
+BodySurface facesOf(const TriangleMesh& mesh)
+{
+  BodySurface out;
+  const Eigen::Vector3d size = mesh.vertices.rowwise().maxCoeff() - mesh.vertices.rowwise().minCoeff();
+  out.radius = kRounding * size.minCoeff();
+  out.points = mesh.vertices;
+  for (Eigen::Index i = 0; i < mesh.triangles.cols(); ++i)
+    out.triangles.push_back({mesh.triangles(0, i), mesh.triangles(1, i), mesh.triangles(2, i)});
   return out;
 }
 
 }   // namespace
 
-bool hasBodySurface(const Shape& shape)
-{
-  return std::holds_alternative<Sphere>(shape) || std::holds_alternative<Capsule>(shape) ||
-         std::holds_alternative<Box>(shape);
-}
-
 BodySurface makeBodySurface(const Shape& shape, const Pose& X_BS)
 {
-  if (!hasBodySurface(shape))
-    throw std::invalid_argument("a body of this shape has no surface that touches solids");
-  const auto* sphere = std::get_if<Sphere>(&shape);
-  const auto* rounded = std::get_if<Capsule>(&shape);
-  BodySurface out = sphere    ? capsule(sphere->radius, 0.0)
-                    : rounded ? capsule(rounded->radius, rounded->length)
-                              : edgesOf(std::get<Box>(shape));
+  struct
+  {
+    BodySurface operator()(const Plane&) const { throw std::invalid_argument("a body cannot be a plane"); }
+    BodySurface operator()(const Sphere& s) const { return capsule(s.radius, 0.0); }
+    BodySurface operator()(const Capsule& s) const { return capsule(s.radius, s.length); }
+    BodySurface operator()(const Box& s) const { return facesOf(s); }
+    BodySurface operator()(const Cylinder& s) const { return facesOf(s); }
+    BodySurface operator()(const std::shared_ptr<const TriangleMesh>& s) const { return facesOf(*s); }
+  } make;
+  BodySurface out = std::visit(make, shape);
   for (Eigen::Index i = 0; i < out.points.cols(); ++i)
     out.points.col(i) = X_BS * Eigen::Vector3d(out.points.col(i));
   return out;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include <Eigen/Core>
@@ -9,8 +10,8 @@
 
 namespace slender {
 
-/// What a simulated body shows to solids: segments with a radius between points in the frame of the body. Where two
-/// bodies meet, the segments of each touch the solid of the other.
+/// What a simulated body shows to solids: segments and triangles with a radius, between points in the frame of the
+/// body. Where two bodies meet, the pieces of each touch the solid of the other.
 struct BodySurface
 {
   struct Segment
@@ -20,13 +21,17 @@ struct BodySurface
   };
   Eigen::Matrix3Xd points;   ///< [m]
   std::vector<Segment> segments;
+  std::vector<std::array<int, 3>> triangles;
+  double radius = 0.0;   ///< of the triangles [m]
+  bool empty() const { return segments.empty() && triangles.empty(); }
 };
 
-/// Whether bodies of this shape touch solids: spheres, capsules and boxes do.
-bool hasBodySurface(const Shape& shape);
+constexpr int kSidesOfCylinder = 64;   ///< of the prism that stands for a cylinder
 
-/// The surface of a shape in the frame X_BS: one segment of a sphere (without length) or a capsule; the edges of a box,
-/// which are rounded by a twentieth of its shortest side. Throws std::invalid_argument for other shapes.
+/// The surface of a shape in the frame X_BS: one segment of a sphere (without length) or a capsule, the faces of a box,
+/// of a prism inside a cylinder, or of a mesh. Edges of a box and of a prism are rounded by a thousandth of their
+/// shortest side. A mesh grows on all sides by a thousandth of the shortest side of the box around it. Throws
+/// std::invalid_argument for a plane.
 BodySurface makeBodySurface(const Shape& shape, const Pose& X_BS);
 
 }   // namespace slender

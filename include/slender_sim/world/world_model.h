@@ -56,8 +56,8 @@ struct WorldModel
   struct Body
   {
     RigidBodyModel body;
-    /// Shape that other parts touch. With nothing they pass through the body. Spheres, boxes and capsules of simulated
-    /// bodies touch obstacles and other bodies, if contact.gap is not 0.
+    /// Shape that other parts touch. With nothing they pass through the body. Simulated bodies touch obstacles and
+    /// other bodies, if contact.gap is not 0.
     std::optional<Shape> shape;
     Pose X_BS;                ///< the shape in the body's frame
     double friction = -1.0;   ///< as Obstacle::friction

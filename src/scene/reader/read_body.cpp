@@ -201,8 +201,8 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
   damping.finish();
   assign(body.contact,
          map.get("contact",
-                 "Whether the shape touches rods, threads and cloths that have contact. Simulated spheres, boxes and "
-                 "capsules also touch obstacles and other bodies. Without the key: true.")
+                 "Whether the shape touches rods, threads and cloths that have contact. A simulated body also touches "
+                 "obstacles and other bodies. Without the key: true.")
              .boolean());
   body.friction = map.get("friction",
                           "Coefficient of friction. Between two objects the geometric mean of both coefficients "
