@@ -458,7 +458,7 @@ void BagReader::Contents::add(const slender_sim::BodyStates& states, std::vector
 void BagReader::Contents::add(const slender_sim::Fields& fields)
 {
   // names of tables become names of files
-  static const std::set<std::string> known{"rod_fields", "thread_fields", "cloth_fields", "energies"};
+  static const std::set<std::string> known{"rod_fields", "thread_fields", "cloth_fields", "solid_fields", "energies"};
   for (const slender_sim::FieldTable& from : fields.tables)
   {
     const std::size_t columns = from.columns.size(), rows = columns > 0 ? from.values.size() / columns : 0;

@@ -79,6 +79,12 @@ void IslandScheduler::addContacts(std::vector<ContactForce>& out) const
         out.push_back({term.position, term.force});
 }
 
+void IslandScheduler::addSolidLoads(SolidLoads& out) const
+{
+  for (const ObjectIsland* island : islands_)
+    island->addSolidLoads(out);
+}
+
 /// On the surface points of an object that is one part [N].
 Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const Part& part) const
 {

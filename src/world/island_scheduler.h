@@ -30,6 +30,7 @@ public:
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override;
   void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addContacts(std::vector<ContactForce>& out) const override;
+  void addSolidLoads(SolidLoads& out) const override;
   void setThreads(int threads) override { loop_.threads = threads; }
   const std::vector<Wrench>& wrenches(int rod) const override { return objects_.rods[rod].stepper->wrenches; }
   Eigen::Matrix3Xd rodContactForces(int rod) const override;

@@ -235,6 +235,28 @@ void ObjectIsland::trace()
   }
 }
 
+void ObjectIsland::addSolidLoads(SolidLoads& out) const
+{
+  if (!contact())
+    return;
+  for (const ContactTerm& term : contact()->terms())
+  {
+    if (term.solid < 0)
+      continue;
+    const WorldSolid& solid = *solids_[term.solid];
+    if (solid.kind == WorldSolid::Kind::obstacle)
+      out.obstacles[solid.index].add(-term.force, term.position);
+    if (solid.kind == WorldSolid::Kind::body)
+      out.bodies[solid.index].add(-term.force, term.position);
+    for (const BodyObject* body : bodies_)   // of which the points may be
+    {
+      const Part& part = *body->part;
+      if (const int point = term.point[0] - part.first_point; point >= 0 && point < part.points())
+        out.bodies[body->index].add(term.force, term.position);
+    }
+  }
+}
+
 void ObjectIsland::end(WorldState& state) const
 {
   if (contact())

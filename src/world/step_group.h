@@ -26,6 +26,8 @@ public:
   virtual void finish(WorldState&, const WorldInputs&, StepReport&) {}
   /// Appends the contacts of the last step.
   virtual void addContacts(std::vector<ContactForce>&) const {}
+  /// Adds what they exert on obstacles and bodies.
+  virtual void addSolidLoads(SolidLoads&) const {}
   virtual void setThreads(int) {}
 
   // ---- of groups that hold rods

@@ -143,6 +143,14 @@ public:
     return all;
   }
 
+  SolidLoads solidLoads() const
+  {
+    SolidLoads all{std::vector<SolidLoad>(model.obstacles.size()), std::vector<SolidLoad>(model.bodies.size())};
+    for (const auto& group : groups_)
+      group->addSolidLoads(all);
+    return all;
+  }
+
   const WorldModel model;
 
   /// Where an object is.
@@ -373,6 +381,7 @@ ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eig
 }
 
 std::vector<ContactForce> World::contacts() const { return impl_->contacts(); }
+SolidLoads World::solidLoads() const { return impl_->solidLoads(); }
 
 const FunctionSet& World::functions(int cloth, const WorldState& state) const
 {

@@ -301,16 +301,43 @@ rods:
 )");
   run(simulation, 100);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
-  ASSERT_EQ(tables.size(), 4u);
+  ASSERT_EQ(tables.size(), 5u);
   EXPECT_EQ(tables[0].object, "other");
   EXPECT_EQ(column(tables[0], "contact_fz [N]").norm(), 0.0);
   const double weight = 9.81 * simulation.rodModel(1).totalMass();
   EXPECT_NEAR(column(tables[1], "contact_fz [N]").sum(), weight, 1e-3 * weight);   // it has come to rest
-  EXPECT_EQ(tables[3].table, "energies");
+  EXPECT_EQ(tables[2].object, "floor");
+  EXPECT_NEAR(column(tables[2], "contact_fz [N]")[0], -weight, 1e-3 * weight);
+  EXPECT_EQ(tables[4].table, "energies");
   const RodEnergies e = simulation.energies(1);
-  EXPECT_EQ(column(tables[3], "kinetic [J]")[0], e.kinetic);
-  EXPECT_EQ(column(tables[3], "gravity [J]")[0], e.gravity);
+  EXPECT_EQ(column(tables[4], "kinetic [J]")[0], e.kinetic);
+  EXPECT_EQ(column(tables[4], "gravity [J]")[0], e.gravity);
   EXPECT_GT(e.gravity, 0.0);
+}
+
+/// A ball on a box on a table: what each bears is what stands on it, and the torque comes from where it stands.
+TEST(RecordedFields, ContactForcesOfSolids)
+{
+  Simulation simulation = make(R"(
+time: {step: 0.005}
+record: {fields: [contact_force]}
+obstacles: [{name: table, shape: {box: {size: [1, 1, 0.1]}}, pose: {position: [0.2, 0, 0.45]}}]
+bodies:
+  - {name: box, mass: 2, shape: {box: {size: [0.4, 0.2, 0.1]}}, pose: {position: [0, 0, 0.551]}}
+  - {name: ball, mass: 1, shape: {sphere: {radius: 0.05}}, pose: {position: [0.1, 0.02, 0.652]}}
+)");
+  run(simulation, 400);
+  const std::vector<FieldTable> tables = fieldTablesOf(simulation);
+  ASSERT_EQ(tables.size(), 3u);
+  const auto load = [&](std::size_t k, const std::string& name) { return column(tables[k], "contact_" + name)[0]; };
+  const double ball = 9.81, box = 2 * 9.81;
+  EXPECT_NEAR(load(0, "fz [N]"), box, 1e-3 * box);   // the table's force less the ball's
+  EXPECT_NEAR(load(0, "mx [N m]"), 0.0, 1e-3);
+  EXPECT_NEAR(load(1, "fz [N]"), ball, 1e-3 * ball);
+  EXPECT_NEAR(load(2, "fz [N]"), -(box + ball), 1e-3 * box);
+  const double x_ball = simulation.state().bodies[1].X_WB.position.x(),
+               x_box = simulation.state().bodies[0].X_WB.position.x();
+  EXPECT_NEAR(load(2, "my [N m]"), (x_ball - 0.2) * ball + (x_box - 0.2) * box, 1e-2);
 }
 
 std::string fileText(const std::string& path)

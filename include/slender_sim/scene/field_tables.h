@@ -12,7 +12,7 @@ class Simulation;
 /// Fields of one object at one instant; one row per node, vertex, or for `energies` one in all.
 struct FieldTable
 {
-  /// name of the table that the rows belong to: rod_fields, cloth_fields or energies
+  /// name of the table that the rows belong to: rod_fields, cloth_fields, solid_fields or energies
   std::string table;
   std::string object;
   std::vector<std::string> columns;   ///< names with units, e.g. "tension [N]"

@@ -73,6 +73,8 @@ public:
 
   /// Contacts of rods, threads and bodies in the last step.
   std::vector<ContactForce> contacts() const;
+  /// What they exert on obstacles and bodies.
+  SolidLoads solidLoads() const;
 
   /// Test functions in force of a tracked cloth.
   const FunctionSet& functions(int cloth, const WorldState& state) const;

@@ -38,6 +38,23 @@ struct ContactForce
   Eigen::Vector3d force;      ///< on what touches, a solid excepted [N]
 };
 
+/// Sum of the forces of contact on a solid, and their torque about the world's origin.
+struct SolidLoad
+{
+  Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};   ///< [N], [N m]
+  void add(const Eigen::Vector3d& more, const Eigen::Vector3d& at)
+  {
+    force += more;
+    torque += at.cross(more);
+  }
+};
+
+/// The loads on all obstacles and bodies.
+struct SolidLoads
+{
+  std::vector<SolidLoad> obstacles, bodies;
+};
+
 /// Everything that changes while a world moves; saving and restoring it restarts bit-equal.
 struct WorldState
 {

@@ -49,8 +49,9 @@ void checkFields(const YamlCursor& fields, const SceneConfig& scene)
       continue;
     if (*field == RecordField::energy && scene.rods.empty() && scene.cloths.empty() && !bodies)
       item.problem("is recorded of rods, cloths and simulated bodies, and the scene has none; leave it out");
-    if (*field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty())
-      item.problem("is recorded of rods and cloths, and the scene has none; leave it out");
+    if (*field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty() && scene.bodies.empty() &&
+        scene.obstacles.empty())
+      item.problem("is recorded of rods, cloths, bodies and obstacles, and the scene has none; leave it out");
     const bool of_threads =
         *field == RecordField::curvature || *field == RecordField::strain || *field == RecordField::force;
     if (*field < RecordField::energy && scene.rods.empty() && !(of_threads && !scene.threads.empty()))

@@ -106,6 +106,32 @@ void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordF
   columns.moveTo(out);
 }
 
+/// Forces on obstacles and bodies, and torques about the origins of their poses. The impulses of cloth are not known.
+void addSolids(const Simulation& simulation, std::vector<FieldTable>& out)
+{
+  const SceneConfig& scene = simulation.config();
+  const SceneState& state = simulation.state();
+  const SolidLoads loads = simulation.world().solidLoads();
+  const bool known = std::none_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
+    return cloth.contact && cloth.contact->solids && cloth.contact->method == ContactMethod::impulses;
+  });
+  const auto add = [&](const std::string& name, const SolidLoad& load, const Eigen::Vector3d& origin) {
+    Eigen::MatrixXd values(6, 1);
+    values << load.force, load.torque - origin.cross(load.force);
+    if (!known)
+      values.setConstant(empty_cell);
+    Columns columns("solid_fields", name, 1);
+    columns.add(contact_columns, values.topRows(3));
+    columns.add({"contact_mx [N m]", "contact_my [N m]", "contact_mz [N m]"}, values.bottomRows(3));
+    columns.moveTo(out);
+  };
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (scene.bodies[b].shape)
+      add(scene.bodies[b].name, loads.bodies[b], state.bodies[b].X_WB.position);
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
+    add(scene.obstacles[k].name, loads.obstacles[k], state.obstacles[k].position);
+}
+
 /// Curvature at an inner node [1/m]: 2 tan(turn / 2) over the mean length of its two edges, as for rods.
 double threadCurvature(const ThreadState& thread, int node)
 {
@@ -215,6 +241,8 @@ std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
     addThread(simulation, static_cast<int>(k), fields, out);
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
     addCloth(simulation, static_cast<int>(k), fields, out);
+  if (asks(fields, RecordField::contact_force))
+    addSolids(simulation, out);
   if (asks(fields, RecordField::energy))
     addEnergies(simulation, out);
   return out;
