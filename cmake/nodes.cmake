@@ -27,6 +27,7 @@ if(BUILD_TESTING)
     ${PROJECT_SOURCE_DIR}/test/nodes/point_guide_buffer_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/late_guides_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/paused_messages_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/camera_fit_test.cpp
     ${PROJECT_SOURCE_DIR}/test/nodes/step_gaps_test.cpp ${PROJECT_SOURCE_DIR}/test/nodes/guide_gaps_test.cpp)
+  slender_compile_together(node_unit_tests <gtest/gtest.h> <ros/ros.h> <Eigen/Dense>)
   target_compile_definitions(node_unit_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   find_package(GTest REQUIRED)
   target_link_libraries(node_unit_tests PRIVATE slender_sim_node yaml-cpp GTest::gtest GTest::gtest_main)

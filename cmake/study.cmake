@@ -13,13 +13,14 @@ configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_
 add_library(slender_sim_studies OBJECT ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
 target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include)
 target_link_libraries(slender_sim_studies PUBLIC slender_sim)
-# Most of the time of compiling a study goes into these headers.
-target_precompile_headers(slender_sim_studies PRIVATE
+slender_compile_together(slender_sim_studies
   <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h> <slender_sim/study/study.h>)
-# lean tells instructions apart by the lines that they come from; repeatability runs the scenes of the package.
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/performance/repeatability.cpp PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/performance/repeatability.cpp
-  PROPERTY SKIP_PRECOMPILE_HEADERS ON)   # their definitions differ
+# lean tells instructions apart by the lines that they come from; repeatability runs the scenes of the package. Their
+# definitions differ from those of other studies, so they are compiled by themselves and without precompiled headers.
+foreach(study lean repeatability)
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/study/performance/${study}.cpp PROPERTIES
+    COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
+endforeach()
 
 # `study` is too common a name for a target in a shared catkin workspace.
 set(TOOLS ${PROJECT_SOURCE_DIR}/src/tools)
@@ -55,6 +56,7 @@ if(BUILD_TESTING)
   find_package(GTest REQUIRED)
   file(GLOB STUDY_TESTS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/test/study/*.cpp)
   add_executable(study_tests ${STUDY_TESTS})
+  slender_compile_together(study_tests <gtest/gtest.h> <Eigen/Dense> <slender_sim/study/study.h>)
   target_include_directories(study_tests PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/src)
   target_compile_definitions(study_tests PRIVATE SLENDER_SWEEP="$<TARGET_FILE:slender_sim_sweep_program>" SLENDER_STUDY="$<TARGET_FILE:slender_sim_study_program>"
     SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")

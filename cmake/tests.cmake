@@ -9,7 +9,7 @@ foreach(kind unit analytic scenes)
     target_include_directories(${kind}_tests PRIVATE ${PROJECT_SOURCE_DIR})
     target_compile_definitions(${kind}_tests PRIVATE SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     target_link_libraries(${kind}_tests PRIVATE slender_sim GTest::gtest GTest::gtest_main)
-    target_precompile_headers(${kind}_tests PRIVATE
+    slender_compile_together(${kind}_tests
       <gtest/gtest.h> <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h>)
     target_compile_options(${kind}_tests PRIVATE $<$<CONFIG:Release>:-O1>)   # tests spend their time in the library
     if(assimp_FOUND)

@@ -35,7 +35,7 @@ std::string onIncline(double slope, const std::string& shape, double height)
   return text.str();
 }
 
-void run(Simulation& s, double seconds)
+void runFor(Simulation& s, double seconds)
 {
   const int steps = static_cast<int>(std::round(seconds / 0.005));
   for (int k = 0; k < steps; ++k)
@@ -48,9 +48,9 @@ void run(Simulation& s, double seconds)
 /// Mean acceleration downhill over a second, after half a second in which the body settles [m/s^2].
 double acceleration(Simulation& s)
 {
-  run(s, 0.5);
+  runFor(s, 0.5);
   const double before = s.state().bodies[0].velocity.linear.x();
-  run(s, 1.0);
+  runFor(s, 1.0);
   return s.state().bodies[0].velocity.linear.x() - before;
 }
 
@@ -59,7 +59,7 @@ const std::string kBox = "box: {size: [0.2, 0.2, 0.1]}", kBall = "sphere: {radiu
 TEST(BodyContact, ABoxSlipsWhereTheSlopeExceedsTheFriction)
 {
   Simulation sticks(parseScene(onIncline(0.99 * kFriction, kBox, 0.0503)));
-  run(sticks, 1.5);
+  runFor(sticks, 1.5);
   // friction holds by creeping slower than contact.slip_speed, 1e-4 m/s
   EXPECT_LT(std::abs(sticks.state().bodies[0].velocity.linear.x()), 1e-4);
   for (const double slope : {1.01 * kFriction, 2.0 * kFriction})
@@ -93,9 +93,9 @@ TEST(BodyContact, AStackOfTenBoxesStands)
     text << "  - {name: box" << k << ", mass: 1, shape: {box: {size: [0.1, 0.1, 0.1]}}, pose: {position: [0, 0, "
          << 0.5 * kSide + 0.5 * kGap + (kSide + 0.5 * kGap) * k << "]}, friction: 0.3}\n";
   Simulation s(parseScene(text.str() + kFloor));
-  run(s, 0.5);   // until the gaps carry the weight
+  runFor(s, 0.5);   // until the gaps carry the weight
   const WorldState settled = s.state();
-  run(s, 9.5);
+  runFor(s, 9.5);
   for (std::size_t k = 0; k < 10; ++k)
   {
     const Vector3d moved = s.state().bodies[k].X_WB.position - settled.bodies[k].X_WB.position;
@@ -122,7 +122,7 @@ bodies:
     return Vector3d(s.state().bodies[0].velocity.linear + 3.0 * s.state().bodies[1].velocity.linear);
   };
   const Vector3d before = momentum();
-  run(s, 0.5);
+  runFor(s, 0.5);
   EXPECT_GT(s.state().bodies[1].velocity.linear.x(), 0.5);   // it was hit
   EXPECT_LT((momentum() - before).norm(), 1e-12 * before.norm());
 }
@@ -155,7 +155,7 @@ bodies:
   - {name: ball, mass: 0.1, shape: {sphere: {radius: 0.05}}, pose: {position: [0, 0, 0.5]}, velocity: {linear: [0, 0, -20]}}
   - {name: target, mass: 10, shape: {)") +
                             target + "}}\n"));
-    run(s, 0.1);
+    runFor(s, 0.1);
     const double apart = s.state().bodies[0].X_WB.position.z() - s.state().bodies[1].X_WB.position.z();
     EXPECT_GT(apart, 0.05) << target;
   }

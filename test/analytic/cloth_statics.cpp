@@ -66,7 +66,7 @@ Plate supported(int cells)
   return Plate(mesh, 0.01, held, false);
 }
 
-StepReport solve(Plate& plate, bool leave_saddles = true)
+StepReport solvePlate(Plate& plate, bool leave_saddles = true)
 {
   ClothStepper stepper(plate.model, ClothOptions{});
   return stepper.solveEquilibrium(plate.state, plate.inputs, leave_saddles);
@@ -80,7 +80,7 @@ TEST(ClothStatics, aClampedStripBendsUnderItsWeightLikeABeam)
   {
     Plate plate = cantilever(k == 0 ? 10 : 20);
     plate.inputs.gravity = Vector3d(0, 0, -kGravity);
-    const StepReport report = solve(plate);
+    const StepReport report = solvePlate(plate);
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_TRUE(report.stable);
     EXPECT_LT(report.residual, 1e-6);
@@ -112,7 +112,7 @@ TEST(ClothStatics, aPointLoadBendsASupportedPlateAsTheorySays)
   const int centre = kCells / 2 * (kCells + 1) + kCells / 2;
   plate.inputs.forces.setZero(3, plate.model->vertices());
   plate.inputs.forces(2, centre) = kForce;
-  const StepReport report = solve(plate);
+  const StepReport report = solvePlate(plate);
   ASSERT_TRUE(report.ok) << report.message;
   // the study plate's bound for supported plates, halved
   EXPECT_NEAR(plate.state.x(2, centre), kExpected, (0.02 + 1.0 / kCells) * kExpected);
@@ -132,26 +132,26 @@ TEST(ClothStatics, aPlateCompressedBeyondItsBucklingLoadLeavesItsPlane)
     return plate;
   };
   Plate below = compressed(0.9), kept = compressed(1.2), above = compressed(1.2), again = compressed(1.2);
-  const StepReport stable = solve(below);
+  const StepReport stable = solvePlate(below);
   ASSERT_TRUE(stable.ok) << stable.message;
   EXPECT_TRUE(stable.stable);
   EXPECT_EQ(stable.escapes, 0);
   EXPECT_LT(below.deflection(), 1e-9);
 
-  const StepReport saddle = solve(kept, false);
+  const StepReport saddle = solvePlate(kept, false);
   ASSERT_TRUE(saddle.ok) << saddle.message;
   EXPECT_FALSE(saddle.stable);
   EXPECT_LT(saddle.lowest_eigenvalue, 0.0);
   EXPECT_LT(kept.deflection(), 1e-9);
 
-  const StepReport buckled = solve(above);
+  const StepReport buckled = solvePlate(above);
   ASSERT_TRUE(buckled.ok) << buckled.message;
   EXPECT_TRUE(buckled.stable);
   EXPECT_GE(buckled.escapes, 1);
   EXPECT_GT(buckled.lowest_eigenvalue, 0.0);
   EXPECT_LT(buckled.energy, saddle.energy);
   EXPECT_GT(above.deflection(), 0.1 * kThickness);
-  ASSERT_TRUE(solve(again).ok);
+  ASSERT_TRUE(solvePlate(again).ok);
   // the side is chosen by the mode, not by chance
   EXPECT_EQ((above.state.x - again.state.x).cwiseAbs().maxCoeff(), 0.0);
 }
@@ -202,7 +202,7 @@ TEST(ClothStatics, aFlatSheetOnTwoCornersFallsAndHangsBelowThem)
   const TriangleMesh mesh = gridMesh(1.0, 1.0, kCells, kCells, GridPattern::alternating);
   Plate sheet(mesh, 1e-3, {kCells * (kCells + 1), (kCells + 1) * (kCells + 1) - 1}, false);
   sheet.inputs.gravity = Vector3d(0, 0, -1e4);
-  const StepReport report = solve(sheet);
+  const StepReport report = solvePlate(sheet);
   ASSERT_TRUE(report.ok) << report.message;
   EXPECT_TRUE(report.stable);
   // It hangs from the corners of one side, and its lower side is one side's length below, but for strain.
@@ -215,13 +215,13 @@ TEST(ClothStatics, whatHasNoEquilibriumIsRefused)
   Plate loose(gridMesh(1, 1, 4, 4, GridPattern::one_diagonal), 0.01, {}, false);
   loose.inputs.gravity = Vector3d(0, 0, -1);
   const ClothState before = loose.state;
-  const StepReport drifts = solve(loose);
+  const StepReport drifts = solvePlate(loose);
   EXPECT_FALSE(drifts.ok);
   EXPECT_NE(drifts.message.find("grasp"), std::string::npos) << drifts.message;
   EXPECT_EQ((loose.state.x - before.x).cwiseAbs().maxCoeff(), 0.0);
   plate.model->wind_coefficient = 1.0;
   plate.inputs.wind = Vector3d(1, 0, 0);
-  const StepReport blown = solve(plate);
+  const StepReport blown = solvePlate(plate);
   EXPECT_FALSE(blown.ok);
   EXPECT_NE(blown.message.find("leave out wind"), std::string::npos) << blown.message;
 }

@@ -51,7 +51,7 @@ GraspTarget poseAt(const GraspState& start, double t)
           Twist{a * rate * direction, 0.4 * rate * axis}};
 }
 
-RodState run(const Load& load, const TimeConfig& time, double duration, int steps, StepReport* total = nullptr)
+RodState stateAfter(const Load& load, const TimeConfig& time, double duration, int steps, StepReport* total = nullptr)
 {
   Rod rod = softRod(load);
   RodStepper stepper(rod.model, time);
@@ -83,7 +83,7 @@ class Order : public ::testing::TestWithParam<Load>
 TEST_P(Order, OfEveryIntegrator)
 {
   const double duration = 0.16;
-  const RodState reference = run(GetParam(), exactly(Integrator::tr_bdf2), duration, 5120);
+  const RodState reference = stateAfter(GetParam(), exactly(Integrator::tr_bdf2), duration, 5120);
   ASSERT_GT((reference.x - softRod(GetParam()).state.x).colwise().norm().maxCoeff(), 0.02);   // it did move
   for (Integrator integrator : allIntegrators())
   {
@@ -91,7 +91,8 @@ TEST_P(Order, OfEveryIntegrator)
     for (int k = 0; k < 3; ++k)
     {
       // first order shows later
-      const RodState end = run(GetParam(), exactly(integrator), duration, (order(integrator) == 2 ? 160 : 1280) << k);
+      const RodState end =
+          stateAfter(GetParam(), exactly(integrator), duration, (order(integrator) == 2 ? 160 : 1280) << k);
       x[k] = (end.x - reference.x).colwise().norm().maxCoeff();
       v[k] = (end.v - reference.v).colwise().norm().maxCoeff();
     }
@@ -114,7 +115,7 @@ TEST(ErrorControl, MeetsItsTolerance)
 {
   const Load load{"damped_and_moving", true, true, false};
   const double duration = 0.16;
-  const RodState reference = run(load, exactly(Integrator::tr_bdf2), duration, 5120);
+  const RodState reference = stateAfter(load, exactly(Integrator::tr_bdf2), duration, 5120);
   for (Integrator integrator : implicitIntegrators())
   {
     double last_error = 0;
@@ -124,7 +125,7 @@ TEST(ErrorControl, MeetsItsTolerance)
       TimeConfig time = exactly(integrator);
       time.error_tolerance = tolerance;
       StepReport total;
-      const RodState end = run(load, time, duration, 8, &total);   // 20 ms each: far too long for one step
+      const RodState end = stateAfter(load, time, duration, 8, &total);   // 20 ms each: far too long for one step
       const double error = (end.x - reference.x).colwise().norm().maxCoeff();
       // local errors add up, and grow at most a few times in a motion as short as this
       EXPECT_LT(error, 3 * tolerance * total.substeps)

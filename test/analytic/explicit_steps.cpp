@@ -7,7 +7,6 @@
 namespace slender::test {
 namespace {
 
-const Vector3d kNone = Vector3d::Zero();
 const TimeConfig kExplicit = withIntegrator(Integrator::symplectic_euler);
 
 struct Kind
@@ -80,7 +79,7 @@ TEST(ExplicitSteps, TorsionalPendulum)
     g.weld(0, 10, 10,
            g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}),
                      {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin));
-    g.setGravity(kNone);
+    g.setGravity(Vector3d::Zero());
     const double period = 2 * M_PI * std::sqrt(inertia * length / beta);
     const int per_period = 20000;
     World world = g.world(kExplicit, period / per_period);
@@ -243,9 +242,9 @@ TEST(ExplicitSteps, EnergiesAreThoseOfTheFormulation)
   {
     ASSERT_TRUE(stepper.step(rod.state, rod.inputs, 1e-5).ok);
     if (k == 0)
-      start = stepper.energies(rod.state, kNone).total();
+      start = stepper.energies(rod.state, Vector3d::Zero()).total();
   }
-  const RodEnergies end = stepper.energies(rod.state, kNone);
+  const RodEnergies end = stepper.energies(rod.state, Vector3d::Zero());
   EXPECT_GT(end.kinetic, 0.05 * start);            // twist has become motion
   EXPECT_NEAR(end.total(), start, 5e-4 * start);   // symplectic: swings by about omega h; measured 7e-5
 }

@@ -7,8 +7,6 @@
 namespace slender::test {
 namespace {
 
-const Vector3d kNone = Vector3d::Zero();
-
 /// End to end error of the angular velocity of a free body with three moments, after 1 s, in steps of 1/count s.
 Twist tumble(Integrator integrator, int count, Pose& end)
 {
@@ -16,7 +14,7 @@ Twist tumble(Integrator integrator, int count, Pose& end)
   Twist spin;
   spin.angular << 1.0, 5.0, 0.3;
   g.addBody(bodyOf(1.0, {0.02, 0.035, 0.05}), {}, spin);
-  g.setGravity(kNone);
+  g.setGravity(Vector3d::Zero());
   World world = g.world(withIntegrator(integrator), 1.0 / count);
   for (int k = 0; k < count; ++k)
   {
@@ -63,7 +61,7 @@ TEST(RigidBodies, TorsionalPendulum)
   const int body = g.addBody(bodyOf(1.0, {inertia, 0.6 * inertia, 0.6 * inertia}),
                              {Vector3d(length, 0, 0), Eigen::Quaterniond::Identity()}, spin);
   g.weld(0, 10, 10, body);
-  g.setGravity(kNone);
+  g.setGravity(Vector3d::Zero());
   const double period = 2 * M_PI * std::sqrt(inertia * length / beta), h = period / 400;
   World world = g.world(withIntegrator(Integrator::tr_bdf2), h);
   double time = 0, last = 0, crossing = 0;

@@ -7,8 +7,6 @@
 namespace slender::test {
 namespace {
 
-const Vector3d kNone = Vector3d::Zero();
-
 /// Rope of the given number of nodes lying along x at height z.
 Rod rope(int n, double length, double radius, double z, double youngs = 1e6)
 {

@@ -29,7 +29,7 @@ Rod lateralRod(int edges, double gamma)
 /// above the threshold of lateralRod(), which lies between those of a/b = 2 (98) and 3 (42)
 constexpr double kLateral = 56.0;
 
-StepReport solve(Rod& rod, bool leave_saddles = true)
+StepReport solveRod(Rod& rod, bool leave_saddles = true)
 {
   RodStepper stepper(rod.model, TimeConfig{});
   return stepper.solveEquilibrium(rod.state, rod.inputs, leave_saddles);
@@ -39,7 +39,7 @@ TEST(StableStatics, aRodStartedOnTheUnstableBranchLeavesIt)
 {
   // Starts straight, exactly in the plane in which it may not stay: before, it stayed there and reported success.
   Rod rod = lateralRod(200, 1.2 * kLateral), symmetric = rod, again = rod;
-  const StepReport report = solve(rod);
+  const StepReport report = solveRod(rod);
   ASSERT_TRUE(report.ok) << report.message;
   EXPECT_TRUE(report.stable);
   EXPECT_GT(report.lowest_eigenvalue, 0.0);
@@ -48,7 +48,7 @@ TEST(StableStatics, aRodStartedOnTheUnstableBranchLeavesIt)
   EXPECT_GT(rod.state.x.row(1).cwiseAbs().maxCoeff(), 0.05);   // of the length; in the plane it would be 1e-9
 
   // Kept on the branch it says that this is a saddle, of higher energy.
-  const StepReport kept = solve(symmetric, false);
+  const StepReport kept = solveRod(symmetric, false);
   ASSERT_TRUE(kept.ok) << kept.message;
   EXPECT_FALSE(kept.stable);
   EXPECT_LT(kept.lowest_eigenvalue, 0.0);
@@ -56,7 +56,7 @@ TEST(StableStatics, aRodStartedOnTheUnstableBranchLeavesIt)
   EXPECT_GT(kept.energy, report.energy);
 
   // The side is chosen by the mode, not by chance.
-  ASSERT_TRUE(solve(again).ok);
+  ASSERT_TRUE(solveRod(again).ok);
   EXPECT_TRUE(bitEqual(rod.state, again.state));
 }
 
@@ -70,7 +70,7 @@ TEST(StableStatics, theLowestEigenvalueIsTheSquareOfTheLowestFrequency)
     rod.hold(0, 0);
     if (both)
       rod.hold(n - 1, n - 1);
-    const StepReport report = solve(rod);
+    const StepReport report = solveRod(rod);
     ASSERT_TRUE(report.ok && report.stable);
     const double expected = std::pow(both ? 4.730041 : 1.875104, 4) * 2.0 / 0.5;
     EXPECT_NEAR(report.lowest_eigenvalue / expected, 1.0, 2e-3);   // bisection to 1e-3, and second order in 1/100
@@ -83,7 +83,7 @@ TEST(StableStatics, motionsThatCostNothingAreNeutralAndNotUnstable)
   Rod rod = straightRod(31, 1.0, modulusSection(1.0, 0.8, 1e5, 1.0));
   rod.inputs.gravity = Vector3d(9.81, 0, 0);
   rod.hold(0, 0, false);
-  const StepReport hanging = solve(rod);
+  const StepReport hanging = solveRod(rod);
   ASSERT_TRUE(hanging.ok) << hanging.message;
   EXPECT_TRUE(hanging.stable);
   EXPECT_EQ(hanging.escapes, 0);
@@ -91,7 +91,7 @@ TEST(StableStatics, motionsThatCostNothingAreNeutralAndNotUnstable)
   Rod standing = straightRod(31, 1.0, modulusSection(1.0, 0.8, 1e5, 1.0));
   standing.inputs.gravity = Vector3d(-9.81, 0, 0);
   standing.hold(0, 0, false);
-  const StepReport fallen = solve(standing);
+  const StepReport fallen = solveRod(standing);
   ASSERT_TRUE(fallen.ok) << fallen.message;
   EXPECT_TRUE(fallen.stable);
   EXPECT_NEAR(standing.state.x(0, 30), -1.0, 1e-3);   // stretched by its weight by 5e-5
@@ -102,7 +102,7 @@ TEST(StableStatics, adviceIsAboutStatics)
   // nothing holds this rod: there is no equilibrium
   Rod rod = straightRod(11, 1.0, modulusSection(1.0, 0.8, 1e5, 1.0));
   rod.inputs.gravity = Vector3d(0, 0, -9.81);
-  const StepReport report = solve(rod);
+  const StepReport report = solveRod(rod);
   ASSERT_FALSE(report.ok);
   EXPECT_NE(report.message.find("hold it"), std::string::npos) << report.message;
   EXPECT_EQ(report.message.find("0 ms"), std::string::npos) << report.message;

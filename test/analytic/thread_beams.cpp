@@ -9,7 +9,7 @@
 namespace slender::test {
 namespace {
 
-constexpr double kMu = 1e5, kGravity = 981, kRadius = 0.1;
+constexpr double kMu = 1e5, kBeamGravity = 981, kRadius = 0.1;
 
 /// Speed of a node after the inertia has died away and before the beam has sagged.
 double sagSpeed(int edges, bool second_end, int node)
@@ -20,7 +20,7 @@ double sagSpeed(int edges, bool second_end, int node)
   t.model.density = 1.0;
   t.model.viscosity = kMu;
   t.model.nozzle_diameter = 0.0;   // No nozzle: its radius would limit that of the edges.
-  t.inputs.gravity = {0, 0, -kGravity};
+  t.inputs.gravity = {0, 0, -kBeamGravity};
   t.inputs.ends[0] = Pose{};
   // x into the thread, y along d1
   t.inputs.ends[1] = {{1, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()))};
@@ -34,7 +34,7 @@ double sagSpeed(int edges, bool second_end, int node)
 
 TEST(ThreadBeams, CantileverAndClampedBeamSagAtTheirSpeeds)
 {
-  const double tip = kGravity / (6 * kMu * kRadius * kRadius);   // rho g A L^4 / (8 . 3 mu I)
+  const double tip = kBeamGravity / (6 * kMu * kRadius * kRadius);   // rho g A L^4 / (8 . 3 mu I)
   const double middle = tip * 8 / 384;
   EXPECT_NEAR(sagSpeed(40, false, 40), tip, 5e-3 * tip);
   EXPECT_NEAR(sagSpeed(40, true, 20), middle, 5e-3 * middle);
@@ -52,12 +52,12 @@ TEST(ThreadBeams, HoldersBearTheWeight)
   t.model.density = 1.0;
   t.model.viscosity = kMu;
   t.model.nozzle_diameter = 0.0;   // No nozzle: its radius would limit that of the edges.
-  t.inputs.gravity = {0, 0, -kGravity};
+  t.inputs.gravity = {0, 0, -kBeamGravity};
   t.state.ends[0].held = true;
   ThreadStepper stepper = t.stepper();
   for (int k = 0; k < 8; ++k)
     ASSERT_TRUE(stepper.step(t.state, t.inputs, 5e-4).ok);
-  const double weight = M_PI * kRadius * kRadius * kGravity;
+  const double weight = M_PI * kRadius * kRadius * kBeamGravity;
   EXPECT_NEAR(stepper.endLoads()[0].force.z(), -weight, 5e-3 * weight);
   EXPECT_NEAR(stepper.endLoads()[0].torque.y(), 0.5 * weight, 5e-3 * weight);
   EXPECT_EQ(stepper.endLoads()[1].force.norm(), 0.0);

@@ -9,7 +9,7 @@
 namespace slender {
 namespace {
 
-GuideBuffer::Options options(double delay)
+GuideBuffer::Options delayedBy(double delay)
 {
   GuideBuffer::Options o;
   o.delay = delay;
@@ -25,7 +25,7 @@ Pose turned(double x, double angle)
 double angleBetween(const Pose& a, const Pose& b) { return a.orientation.angularDistance(b.orientation); }
 
 /// Follows `buffer` with fine steps and returns the largest jump of velocity between two of them.
-struct Follower
+struct PoseFollower
 {
   GuideBuffer& buffer;
   double step = 1e-3, time = 0.0;
@@ -57,7 +57,7 @@ struct Follower
 
 TEST(GuideBuffer, HoldsStillWithoutInput)
 {
-  GuideBuffer buffer(options(0.05), Attach::section, turned(0.2, 0.5));
+  GuideBuffer buffer(delayedBy(0.05), Attach::section, turned(0.2, 0.5));
   const GraspTarget target = buffer.target(3.0);
   EXPECT_EQ(target.X_WG.position, turned(0.2, 0.5).position);
   EXPECT_EQ(target.velocity->linear.norm(), 0.0);
@@ -66,7 +66,7 @@ TEST(GuideBuffer, HoldsStillWithoutInput)
 
 TEST(GuideBuffer, RefusesWhatIsNotLater)
 {
-  GuideBuffer buffer(options(0.0), Attach::section, Pose());
+  GuideBuffer buffer(delayedBy(0.0), Attach::section, Pose());
   EXPECT_TRUE(buffer.push(1.0, turned(0.1, 0)));
   EXPECT_FALSE(buffer.push(1.0, turned(0.2, 0)));
   EXPECT_FALSE(buffer.push(0.5, turned(0.2, 0)));
@@ -76,7 +76,7 @@ TEST(GuideBuffer, RefusesWhatIsNotLater)
 
 TEST(GuideBuffer, RefusesBadOptions)
 {
-  EXPECT_THROW(GuideBuffer(options(-0.1), Attach::section, Pose()), std::invalid_argument);
+  EXPECT_THROW(GuideBuffer(delayedBy(-0.1), Attach::section, Pose()), std::invalid_argument);
   GuideBuffer::Options o;
   o.catch_up_speed = 0.0;
   EXPECT_THROW(GuideBuffer(o, Attach::section, Pose()), std::invalid_argument);
@@ -87,9 +87,9 @@ TEST(GuideBuffer, RefusesBadOptions)
 TEST(GuideBuffer, InterpolatesTimelyInput)
 {
   const double delay = 0.1, rate = 30.0;
-  GuideBuffer buffer(options(delay), Attach::section, turned(0, 0));
+  GuideBuffer buffer(delayedBy(delay), Attach::section, turned(0, 0));
   const auto motion = [](double t) { return turned(0.2 * (1 - std::cos(2 * t)), 1.5 * (1 - std::cos(t))); };
-  Follower follower{buffer};
+  PoseFollower follower{buffer};
   int sent = 0;
   double worst = 0, worst_angle = 0;
   for (double t = 0; t < 4.0; t += 1e-3)
@@ -119,8 +119,8 @@ TEST(GuideBuffer, InterpolatesTimelyInput)
 // Input that stops at full speed, and comes back elsewhere: held, then caught up with, and never a jump of velocity.
 TEST(GuideBuffer, HoldsAndCatchesUpSmoothly)
 {
-  GuideBuffer buffer(options(0.05), Attach::section, turned(0, 0));
-  Follower follower{buffer};
+  GuideBuffer buffer(delayedBy(0.05), Attach::section, turned(0, 0));
+  PoseFollower follower{buffer};
   for (int k = 0; k <= 20; ++k)
     buffer.push(0.02 * k, turned(0.02 * k, 0.1 * k));   // 1.45 m/s
   follower.to(1.5);
@@ -144,8 +144,8 @@ TEST(GuideBuffer, HoldsAndCatchesUpSmoothly)
 // Messages that come later than the delay: the curve changes behind the grasp's back, and still nothing jumps.
 TEST(GuideBuffer, LateInputDoesNotJump)
 {
-  GuideBuffer buffer(options(0.0), Attach::section, turned(0, 0));
-  Follower follower{buffer};
+  GuideBuffer buffer(delayedBy(0.0), Attach::section, turned(0, 0));
+  PoseFollower follower{buffer};
   std::mt19937 random(7);
   std::uniform_real_distribution<double> late(0.0, 0.03);
   for (int k = 0; k < 60; ++k)
@@ -161,7 +161,7 @@ TEST(GuideBuffer, DoesNotRunTheOtherWayAfterAPause)
 {
   // silence from 0.3 s to 0.6 s, then 10 m away: the way is long, the speed that is left of the race through the gap
   // dies out within catch_up_time
-  GuideBuffer::Options o = options(0.05);
+  GuideBuffer::Options o = delayedBy(0.05);
   o.catch_up_time = 0.2;
   GuideBuffer buffer(o, Attach::section, Pose());
   double lowest = 0.0, highest = 0.0, before = 0.0;
@@ -189,7 +189,7 @@ TEST(GuideBuffer, DoesNotRunTheOtherWayAfterAPause)
 TEST(GuideBuffer, AttachInitialKeepsTheOffset)
 {
   const Pose start = turned(0.7, 1.0);
-  GuideBuffer buffer(options(0.0), Attach::initial, start);
+  GuideBuffer buffer(delayedBy(0.0), Attach::initial, start);
   buffer.push(1.0, turned(5, 0.3));
   EXPECT_LT((buffer.target(1.0).X_WG.position - start.position).norm(), 1e-9);
   buffer.push(2.0, turned(6, 0.3));
@@ -208,7 +208,7 @@ TEST(GuideBuffer, AGivenOffsetStays)
 {
   const Pose start = turned(0, 0), X_HG = inFront();
   const auto stays = [&](GuideBuffer& buffer, double begin, const Pose& X_WH) {
-    Follower follower{buffer};
+    PoseFollower follower{buffer};
     follower.time = begin;
     for (int k = 0; k <= 100; ++k)
     {
@@ -221,7 +221,7 @@ TEST(GuideBuffer, AGivenOffsetStays)
   };
   for (const Attach attach : {Attach::section, Attach::initial})
   {
-    GuideBuffer buffer(options(0.05), attach, start, X_HG);
+    GuideBuffer buffer(delayedBy(0.05), attach, start, X_HG);
     stays(buffer, 0.0, turned(0.06, 0));
     buffer.restart(start);
     stays(buffer, 3.0, turned(0.1, 0.5));
@@ -234,7 +234,7 @@ TEST(GuideBuffer, AGivenOffsetStays)
 TEST(GuideBuffer, AttachInitialRemembersItsOffset)
 {
   const Pose home = turned(0.2, 0.3), away = turned(0.06, 0.4), start = home * inFront();
-  GuideBuffer buffer(options(0.05), Attach::initial, start);
+  GuideBuffer buffer(delayedBy(0.05), Attach::initial, start);
   double time = 0.0;
   const auto stream = [&](const Pose& X_WH) {
     for (int k = 0; k < 100; ++k, time += 0.02)
@@ -255,7 +255,7 @@ TEST(GuideBuffer, AttachInitialRemembersItsOffset)
   buffer.restart(start);
   EXPECT_LT((stream(away).position - (away * inFront()).position).norm(), 1e-9);
   // before any pose has come
-  GuideBuffer held(options(0.05), Attach::initial, start);
+  GuideBuffer held(delayedBy(0.05), Attach::initial, start);
   held.attachAt(other);
   held.push(0.0, away);
   EXPECT_LT((held.target(1.0).X_WG.position - other.position).norm(), 1e-9);
@@ -276,11 +276,11 @@ TEST(GuideBuffer, StreamsBeginAndEndInMotion)
       for (const Attach attach : {Attach::section, Attach::initial})
       {
         const std::string what = std::to_string(rate) + " Hz" + (live ? ", live" : "");
-        GuideBuffer::Options o = options(0.05);
+        GuideBuffer::Options o = delayedBy(0.05);
         o.live = live;
         const auto at = [&](double t) { return Pose{Eigen::Vector3d(v * t, 0, 1), Eigen::Quaterniond::Identity()}; };
         GuideBuffer buffer(o, attach, at(0.0));
-        Follower follower{buffer};
+        PoseFollower follower{buffer};
         double fastest = 0.0;
         int sent = 0;
         for (double t = 0.0; t < 4.0; t += 1e-3)
@@ -307,7 +307,7 @@ TEST(GuideBuffer, StreamsFromRestToRestAreExact)
     const double s = std::min(t, 1.0);
     return 0.3 * s * s * (3 - 2 * s);
   };
-  GuideBuffer buffer(options(0.05), Attach::section, Pose());
+  GuideBuffer buffer(delayedBy(0.05), Attach::section, Pose());
   double worst = 0.0, farthest = 0.0;
   int sent = 0;
   for (double t = 0.0; t < 2.0; t += 1e-3)
@@ -327,7 +327,7 @@ TEST(GuideBuffer, StepsAreNotOvershot)
 {
   for (const int before : {1, 2, 10})
   {
-    GuideBuffer buffer(options(0.05), Attach::section, Pose());
+    GuideBuffer buffer(delayedBy(0.05), Attach::section, Pose());
     double farthest = 0.0;
     for (int k = 0; k <= before; ++k)
       buffer.push(0.02 * k, {Eigen::Vector3d(k < before ? 0.0 : 0.1, 0, 0), Eigen::Quaterniond::Identity()});
@@ -343,7 +343,7 @@ TEST(GuideBuffer, StepsAreNotOvershot)
 TEST(GuideBuffer, TheGreatestLagForAll)
 {
   const auto way = [](double t) { return Pose{Eigen::Vector3d(std::sin(t), 0, 0), Eigen::Quaterniond::Identity()}; };
-  GuideBuffer timely(options(0.05), Attach::section, Pose()), late(options(0.05), Attach::section, Pose());
+  GuideBuffer timely(delayedBy(0.05), Attach::section, Pose()), late(delayedBy(0.05), Attach::section, Pose());
   double apart = 0.0;
   for (int k = 0; k < 400; ++k)
   {
@@ -367,7 +367,7 @@ TEST(GuideBuffer, TheGreatestLagForAll)
 
 TEST(GuideBuffer, AttachingWhileRunningKeepsTheNewPlace)
 {
-  GuideBuffer buffer(options(0.0), Attach::initial, Pose());
+  GuideBuffer buffer(delayedBy(0.0), Attach::initial, Pose());
   buffer.push(0.0, turned(0, 0));
   buffer.target(0.0);
   buffer.target(0.5);
@@ -381,7 +381,7 @@ TEST(GuideBuffer, AttachingWhileRunningKeepsTheNewPlace)
 // What a limit has held (on_limit: hold) goes back to where its gripper is, and does not take another hold of it.
 TEST(GuideBuffer, StandingStillMeanwhileKeepsTheOffset)
 {
-  GuideBuffer buffer(options(0.0), Attach::initial, Pose());
+  GuideBuffer buffer(delayedBy(0.0), Attach::initial, Pose());
   buffer.push(0.0, turned(0, 0));
   buffer.target(0.0);
   buffer.push(0.5, turned(0.2, 0));

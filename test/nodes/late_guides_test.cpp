@@ -89,7 +89,7 @@ Result follow(const Command& command, const GuideBuffer::Options& options, doubl
   return result;
 }
 
-GuideBuffer::Options options(bool live, bool automatic = false)
+GuideBuffer::Options lateOptions(bool live, bool automatic = false)
 {
   GuideBuffer::Options o;
   o.live = live;
@@ -108,7 +108,7 @@ TEST(LateGuides, ConstantlyLate)
       {
         const Command command{frequency};
         const double late = 1e-3 * ms, most = commanded(command, 6.0);
-        const Result result = follow(command, options(live), 6.0, [&](int) { return late; });
+        const Result result = follow(command, lateOptions(live), 6.0, [&](int) { return late; });
         EXPECT_LE(result.acceleration, 1.5 * most) << ms << " ms, " << frequency << " Hz" << (live ? ", live" : "");
         EXPECT_LE(result.turning, 1.5 * 3.0 * most) << ms << " ms, " << frequency << " Hz" << (live ? ", live" : "");
         // the motion is late but follows the command's path, up to the error of cubics through 100 poses a second
@@ -128,8 +128,8 @@ TEST(LateGuides, InTimeIsExact)
   const Command command;
   std::mt19937 random(11);
   std::uniform_real_distribution<double> late(0.0, 0.025);
-  const Result steady = follow(command, options(false), 4.0, [](int) { return 0.0; });
-  const Result jittery = follow(command, options(false), 4.0, [&](int) { return late(random); });
+  const Result steady = follow(command, lateOptions(false), 4.0, [](int) { return 0.0; });
+  const Result jittery = follow(command, lateOptions(false), 4.0, [&](int) { return late(random); });
   EXPECT_EQ(steady.lag, jittery.lag);
   EXPECT_EQ(steady.lag, 0.05);
   EXPECT_EQ(steady.acceleration, jittery.acceleration);
@@ -146,7 +146,7 @@ TEST(LateGuides, Jitter)
         const Command command{frequency};
         std::mt19937 random(3);
         std::uniform_real_distribution<double> late(0.0, most_late);
-        const Result result = follow(command, options(live), 8.0, [&](int) { return late(random); });
+        const Result result = follow(command, lateOptions(live), 8.0, [&](int) { return late(random); });
         EXPECT_LE(result.acceleration, 1.5 * commanded(command, 8.0))
             << most_late << " s, " << frequency << " Hz" << (live ? ", live" : "");
         EXPECT_LE(result.error, 1e-4);
@@ -160,7 +160,7 @@ TEST(LateGuides, Hiccup)
   const Command command;
   for (const double hiccup : {0.05, 0.1, 0.2, 0.3})
   {
-    const Result result = follow(command, options(true), 8.0, [&](int k) { return k == 200 ? hiccup : 0.0; });
+    const Result result = follow(command, lateOptions(true), 8.0, [&](int k) { return k == 200 ? hiccup : 0.0; });
     EXPECT_LE(result.acceleration, 1.5 * commanded(command, 8.0)) << hiccup;
     EXPECT_LE(result.error, 1e-4) << hiccup;   // after the first half all is well again
   }
@@ -172,13 +172,13 @@ TEST(LateGuides, Automatic)
   const Command command;
   for (const double late : {0.0, 0.04, 0.1, 0.3})
   {
-    const Result result = follow(command, options(true, true), 6.0, [&](int) { return late; });
+    const Result result = follow(command, lateOptions(true, true), 6.0, [&](int) { return late; });
     EXPECT_LE(result.acceleration, 1.5 * commanded(command, 6.0)) << late;
     EXPECT_NEAR(result.lag, 1.1 * (late + 2.0 * kInterval) + 0.001, 1.1 * kStep + 1e-6) << late;
     EXPECT_EQ(result.excess, 0.0);
   }
   // the network recovers after 5 s: the lag is forgotten within 5 s more, and made up for by a tenth of real time
-  const Result result = follow(command, options(true, true), 20.0, [](int k) { return k < 500 ? 0.3 : 0.0; });
+  const Result result = follow(command, lateOptions(true, true), 20.0, [](int k) { return k < 500 ? 0.3 : 0.0; });
   EXPECT_LE(result.acceleration, 1.5 * commanded(command, 20.0));
   EXPECT_NEAR(result.lag, 1.1 * 2.0 * kInterval + 0.001, 1.1 * kStep + 1e-6);
 }
@@ -192,7 +192,7 @@ TEST(LateGuides, Points)
     for (const double late : {0.0, 0.04, 0.08, 0.3})
     {
       const auto points = [&](double t) { return Eigen::Matrix3Xd(Eigen::Vector3d(1.0, command.at(t), 2.0)); };
-      PointGuideBuffer buffer(options(live), points(0.0));
+      PointGuideBuffer buffer(lateOptions(live), points(0.0));
       double x0 = 0.0, x1 = 0.0, x2 = 0.0, worst = 0.0;
       int sent = 0;
       for (int n = 1; n * kStep < 6.0; ++n)
@@ -211,7 +211,7 @@ TEST(LateGuides, Points)
 TEST(LateGuides, SkippedTime)
 {
   const Command command;
-  GuideBuffer buffer(options(true), Attach::section, command.pose(0.0));
+  GuideBuffer buffer(lateOptions(true), Attach::section, command.pose(0.0));
   double time = 0.0, skipped = 0.0;
   int sent = 0;
   Eigen::Vector3d before = command.pose(0.0).position;

@@ -17,7 +17,7 @@ Matrix3Xd pointsAt(double height)
   return points;
 }
 
-GuideBuffer::Options options(double delay, double coast = 0.0)
+GuideBuffer::Options pointOptions(double delay, double coast = 0.0)
 {
   GuideBuffer::Options o;
   o.delay = delay;
@@ -27,7 +27,7 @@ GuideBuffer::Options options(double delay, double coast = 0.0)
 }
 
 /// Follows with fine steps; largest change of velocity between two of them.
-struct Follower
+struct PointFollower
 {
   PointGuideBuffer& buffer;
   double step = 1e-3, time = 0.0;
@@ -53,7 +53,7 @@ struct Follower
 
 TEST(PointGuideBuffer, InterpolatesTimelyMessagesExactly)
 {
-  PointGuideBuffer buffer(options(0.1), pointsAt(0));
+  PointGuideBuffer buffer(pointOptions(0.1), pointsAt(0));
   PointTrajectory expected;
   Matrix3Xd wanted;
   int sent = 0;
@@ -78,8 +78,8 @@ TEST(PointGuideBuffer, InterpolatesTimelyMessagesExactly)
 TEST(PointGuideBuffer, DoesNotRunTheOtherWayAfterAPause)
 {
   // silence from 0.3 s to 0.6 s, then 10 m away: the trajectory races through the gap
-  PointGuideBuffer buffer(options(0.05), pointsAt(0));
-  Follower follower{buffer};
+  PointGuideBuffer buffer(pointOptions(0.05), pointsAt(0));
+  PointFollower follower{buffer};
   double lowest = 0.0, highest = 0.0;
   for (int k = 0; k < 400; ++k)
   {
@@ -101,10 +101,10 @@ TEST(PointGuideBuffer, CatchesUpWithoutAJolt)
 {
   for (const double coast : {0.0, 0.3})
   {
-    PointGuideBuffer buffer(options(0.0, coast), pointsAt(0));
+    PointGuideBuffer buffer(pointOptions(0.0, coast), pointsAt(0));
     for (int k = 0; k <= 10; ++k)
       buffer.push(0.04 * k, pointsAt(0.04 * k));   // 1 and 2 m/s
-    Follower follower{buffer};
+    PointFollower follower{buffer};
     follower.to(1.0);   // silence from 0.4 s on
     EXPECT_NEAR(follower.x(2, 0), 0.4 + 0.5 * coast, 1e-9);
     EXPECT_LT(follower.worst, 0.2);
@@ -118,8 +118,8 @@ TEST(PointGuideBuffer, CatchesUpWithoutAJolt)
 
 TEST(PointGuideBuffer, BeginsElsewhereAndRestarts)
 {
-  PointGuideBuffer buffer(options(0.0), pointsAt(0.3));
-  Follower follower{buffer};
+  PointGuideBuffer buffer(pointOptions(0.0), pointsAt(0.3));
+  PointFollower follower{buffer};
   follower.to(0.1);
   EXPECT_TRUE(follower.x == pointsAt(0.3));
   buffer.push(0.2, pointsAt(0));

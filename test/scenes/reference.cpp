@@ -9,20 +9,13 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/scene_reference.h"
+#include "study/framework/whole_file.h"
 #include "test/support/shell.h"
 
 namespace slender::test {
 namespace {
 
 const std::string kSource = SLENDER_SOURCE_DIR;
-
-std::string textOf(const std::string& path)
-{
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 const SceneKey& keyOf(const std::vector<SceneKey>& keys, const std::string& path)
 {
@@ -33,7 +26,7 @@ const SceneKey& keyOf(const std::vector<SceneKey>& keys, const std::string& path
 
 TEST(SceneReference, IsUpToDate)
 {
-  EXPECT_EQ(textOf(kSource + "/docs/scene_reference.md"), sceneReference(sceneKeys()))
+  EXPECT_EQ(wholeFile(kSource + "/docs/scene_reference.md"), sceneReference(sceneKeys()))
       << "run scene_reference > docs/scene_reference.md";
 }
 

@@ -3,7 +3,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -15,33 +14,16 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/scene/reader.h"
+#include "study/framework/whole_file.h"
 #include "test/support/shell.h"
+#include "test/support/shipped_scenes.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 
+using slender::test::kSceneFolder;
 using slender::test::Result;
-
-const std::string scenes = std::string(SLENDER_SOURCE_DIR) + "/config/scenes/";
-
-std::string bytesOf(const std::string& path)
-{
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-std::vector<std::string> allScenes()
-{
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(scenes))
-    if (entry.path().extension() == ".yaml")
-      names.push_back(entry.path().stem().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 class ShippedScene : public testing::TestWithParam<std::string>
 {
@@ -58,7 +40,7 @@ protected:
 // Replays promise it. Fresh memory holds other bytes in the second process, and there are more threads.
 TEST_P(ShippedScene, isTheSameTwiceToTheBit)
 {
-  const std::string file = scenes + GetParam() + ".yaml",
+  const std::string file = kSceneFolder + GetParam() + ".yaml",
                     reduced = GetParam() == "hair" ? " --set generate.0.hair.strands=60" : "";
   std::ostringstream command;
   command << SLENDER_SIMULATE << " " << file << reduced << " --quiet --duration "
@@ -70,12 +52,12 @@ TEST_P(ShippedScene, isTheSameTwiceToTheBit)
   ASSERT_EQ(first.status, 0) << first.output;
   EXPECT_EQ(second.status, 0) << second.output;
   EXPECT_EQ(first.output, second.output);
-  const std::string state = bytesOf(folder_ + "/first");
+  const std::string state = slender::wholeFile(folder_ + "/first");
   EXPECT_GT(state.size(), 100u);
-  EXPECT_TRUE(state == bytesOf(folder_ + "/second"));
+  EXPECT_TRUE(state == slender::wholeFile(folder_ + "/second"));
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedScene, testing::ValuesIn(allScenes()));
+INSTANTIATE_TEST_SUITE_P(All, ShippedScene, testing::ValuesIn(slender::test::shippedScenes()));
 
 /// Runs `simulate` with the arguments, sends it the signal when it has recorded something, and returns its exit status,
 /// 1000 and more: a signal ended it.
@@ -117,7 +99,7 @@ TEST(Signals, endAStepAndSaveWhatWasReached)
     const int status = statusAfter(signal, {scene, "--quiet", "--csv", folder + "/csv", "--state", folder + "/state"},
                                    folder + "/csv/nodes.csv");
     EXPECT_EQ(status, 128 + signal);
-    EXPECT_GT(bytesOf(folder + "/state").size(), 100u);
+    EXPECT_GT(slender::wholeFile(folder + "/state").size(), 100u);
   }
   fs::remove_all(folder);
 }

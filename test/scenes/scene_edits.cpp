@@ -11,10 +11,13 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/state_bytes.h"
+#include "test/support/scenes.h"
+#include "test/support/shipped_scenes.h"
 
 namespace slender {
 namespace {
 
+using test::runSteps;
 using Kind = SceneEdit::Kind;
 using Running = std::unique_ptr<Simulation>;
 
@@ -49,15 +52,6 @@ cloths:
 )";
 
 Running make(const std::string& text) { return std::make_unique<Simulation>(parseScene(text, "t.yaml")); }
-
-void run(Simulation& simulation, int steps)
-{
-  for (int k = 0; k < steps; ++k)
-  {
-    const StepReport report = simulation.step(simulation.defaultInputs());
-    ASSERT_TRUE(report.ok) << report.message;
-  }
-}
 
 void edit(Running& running, Kind kind, const std::string& text) { running = editedSimulation(*running, {kind, text}); }
 
@@ -100,10 +94,9 @@ std::vector<std::string> lightScenes()
   // seconds per step, or only by statics
   const std::set<std::string> heavy{"hair", "skirt", "sweater"};
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(SLENDER_SOURCE_DIR) + "/config/scenes"))
-    if (entry.path().extension() == ".yaml" && !heavy.count(entry.path().stem().string()))
-      names.push_back(entry.path().stem().string());
-  std::sort(names.begin(), names.end());
+  for (const std::string& name : test::shippedScenes())
+    if (!heavy.count(name))
+      names.push_back(name);
   return names;
 }
 
@@ -113,22 +106,22 @@ class EditedShippedScene : public testing::TestWithParam<std::string>
 // All kinds of objects, of grasps, and of memory that integrators have.
 TEST_P(EditedShippedScene, goesOnToTheLastBit)
 {
-  const std::string path = std::string(SLENDER_SOURCE_DIR) + "/config/scenes/" + GetParam() + ".yaml";
+  const std::string path = test::kSceneFolder + GetParam() + ".yaml";
   SceneConfig config = readScene(path);
   Running edited = std::make_unique<Simulation>(config, false), untouched = std::make_unique<Simulation>(config, false);
-  run(*edited, 3);
-  run(*untouched, 3);
+  runSteps(*edited, 3);
+  runSteps(*untouched, 3);
   char wind[120];
   std::snprintf(wind, sizeof wind, "wind.velocity=[%.17g, %.17g, %.17g]", config.wind.x(), config.wind.y(),
                 config.wind.z());
   edit(edited, Kind::set_parameter, wind);
   ASSERT_TRUE(bytes(*edited) == bytes(*untouched));
-  run(*edited, 3);
-  run(*untouched, 3);
+  runSteps(*edited, 3);
+  runSteps(*untouched, 3);
   ASSERT_TRUE(bytes(*edited) == bytes(*untouched));
   edit(edited, Kind::spawn, "bodies: {name: far_away, pose: {position: [1000, 0, 0]}, motion: fixed}");
-  run(*edited, 2);
-  run(*untouched, 2);
+  runSteps(*edited, 2);
+  runSteps(*untouched, 2);
   edit(edited, Kind::remove, "far_away");
   EXPECT_TRUE(bytes(*edited) == bytes(*untouched));
   edited->reset();
@@ -147,11 +140,11 @@ TEST(SceneEdit, theSameValueChangesNothing)
     const std::vector<std::string> choice{std::string("time.integrator=") + integrator};
     edited = std::make_unique<Simulation>(parseScene(ropes, "t.yaml", choice));
     untouched = std::make_unique<Simulation>(parseScene(ropes, "t.yaml", choice));
-    run(*edited, 20);
-    run(*untouched, 20);
+    runSteps(*edited, 20);
+    runSteps(*untouched, 20);
     edit(edited, Kind::set_parameter, "rods.rope.material.youngs_modulus=1e6\nrods.1.damping.stiffness=0.003\n");
-    run(*edited, 20);
-    run(*untouched, 20);
+    runSteps(*edited, 20);
+    runSteps(*untouched, 20);
     EXPECT_TRUE(bytes(*edited) == bytes(*untouched)) << integrator;
   }
 }
@@ -159,8 +152,8 @@ TEST(SceneEdit, theSameValueChangesNothing)
 TEST(SceneEdit, whatIsSpawnedFarAwayChangesNothingElse)
 {
   Running edited = make(ropes), untouched = make(ropes);
-  run(*edited, 10);
-  run(*untouched, 10);
+  runSteps(*edited, 10);
+  runSteps(*untouched, 10);
   edit(edited, Kind::spawn, R"(
 rods:
   - centerline: {straight: {from: [0, 20, 1], to: [1, 20, 1], edges: 10}}
@@ -174,8 +167,8 @@ obstacles: [{name: table, shape: {plane: {point: [0, 0, -9], normal: [0, 0, 1]}}
   EXPECT_EQ(edited->config().contact.gap, untouched->config().contact.gap);
   EXPECT_EQ(edited->config().time.integrator, untouched->config().time.integrator);
   EXPECT_EQ(edited->state().steps, 10u);
-  run(*edited, 20);
-  run(*untouched, 20);
+  runSteps(*edited, 20);
+  runSteps(*untouched, 20);
   for (const char* name : {"rope", "cable"})
     EXPECT_TRUE(stateBytes(rod(*edited, name)) == stateBytes(rod(*untouched, name))) << name;
   EXPECT_TRUE(edited->state().bodies[0].X_WB.position == untouched->state().bodies[0].X_WB.position);
@@ -186,33 +179,33 @@ obstacles: [{name: table, shape: {plane: {point: [0, 0, -9], normal: [0, 0, 1]}}
   edit(edited, Kind::remove, "table");
   edit(edited, Kind::remove, "rod2");
   EXPECT_TRUE(bytes(*edited) == bytes(*untouched));
-  run(*edited, 20);
-  run(*untouched, 20);
+  runSteps(*edited, 20);
+  runSteps(*untouched, 20);
   EXPECT_TRUE(bytes(*edited) == bytes(*untouched));
 }
 
 TEST(SceneEdit, spawnsFirstObjectsOfAKindAndRemovesFirstOnes)
 {
   Running edited = make(ropes);
-  run(*edited, 10);
+  runSteps(*edited, 10);
   const RodState before = rod(*edited, "cable");
   edit(edited, Kind::set_parameter, "contact.gap=0.0005");   // of which nothing is left below
   edit(edited, Kind::remove, "rope");
   ASSERT_EQ(edited->config().rods.size(), 1u);
   EXPECT_TRUE(stateBytes(rod(*edited, "cable")) == stateBytes(before));
-  run(*edited, 3);
+  runSteps(*edited, 3);
   edit(edited, Kind::spawn, "rods: {name: rope, centerline: {straight: {from: [0, 0, 2], to: [1, 0, 2], edges: 7}}}");
   EXPECT_EQ(rod(*edited, "rope").x.cols(), 8);
   EXPECT_EQ(rod(*edited, "rope").x.col(3).z(), 2.0);   // as its text says
-  run(*edited, 3);
+  runSteps(*edited, 3);
   EXPECT_LT(rod(*edited, "rope").x.col(3).z(), 2.0);
 }
 
 TEST(SceneEdit, aSpawnedBallFallsOnTheRope)
 {
   Running edited = make(ropes), untouched = make(ropes);
-  run(*edited, 60);
-  run(*untouched, 60);
+  runSteps(*edited, 60);
+  runSteps(*untouched, 60);
   const double sag = rod(*edited, "rope").x.row(2).minCoeff();
   ASSERT_LT(sag, 0.99);
   char place[80];
@@ -220,8 +213,8 @@ TEST(SceneEdit, aSpawnedBallFallsOnTheRope)
   edit(edited, Kind::spawn,
        std::string("bodies: [{name: ball, shape: {sphere: {radius: 0.04}}, mass: 0.3, pose: {position: ") + place +
            "}}]");
-  run(*edited, 40);
-  run(*untouched, 40);
+  runSteps(*edited, 40);
+  runSteps(*untouched, 40);
   const double ball = edited->state().bodies[1].X_WB.position.z(), rope = rod(*edited, "rope").x.col(10).z();
   EXPECT_LT(rope, rod(*untouched, "rope").x.col(10).z() - 0.01);   // pushed down
   EXPECT_GT(ball - rope, 0.045);                                   // the radii are 0.05 together
@@ -231,7 +224,7 @@ TEST(SceneEdit, aSpawnedBallFallsOnTheRope)
 TEST(SceneEdit, refusesWhatCrossesNowAndNotWhatCrossedAtTheStart)
 {
   Running edited = make(ropes);
-  run(*edited, 100);
+  runSteps(*edited, 100);
   const double sag = rod(*edited, "rope").x.col(10).z();
   ASSERT_LT(sag, 0.92);
   const auto ball = [](double z) {
@@ -240,7 +233,7 @@ TEST(SceneEdit, refusesWhatCrossesNowAndNotWhatCrossedAtTheStart)
   };
   EXPECT_REFUSED(*edited, Kind::spawn, ball(sag), "ball");
   edit(edited, Kind::spawn, ball(1.0));   // where the rope was at the start
-  run(*edited, 5);
+  runSteps(*edited, 5);
   const std::string before = bytes(*edited);
   EXPECT_THROW(edited->reset(), SceneError);
   EXPECT_TRUE(bytes(*edited) == before);
@@ -252,25 +245,25 @@ TEST(SceneEdit, refusesWhatCrossesNowAndNotWhatCrossedAtTheStart)
 TEST(SceneEdit, resetsToTheStartOfTheEditedScene)
 {
   Running edited = make(ropes);
-  run(*edited, 10);
+  runSteps(*edited, 10);
   edit(edited, Kind::spawn,
        "bodies: {name: ball, shape: {sphere: {radius: 0.02}}, mass: 1, pose: {position: [3, 3, 3]}}");
   edit(edited, Kind::attach, "rope: {middle: {nodes: [10], hold: position}}");
-  run(*edited, 10);
+  runSteps(*edited, 10);
   edited->reset();
   EXPECT_EQ(edited->state().steps, 0u);
   EXPECT_EQ(edited->state().bodies[1].X_WB.position.z(), 3.0);
   const RodState& rope = rod(*edited, "rope");
   EXPECT_EQ(rope.x.col(10).z(), 1.0);
   EXPECT_EQ(rope.grasps[2].X_WG.position.z(), 1.0);
-  run(*edited, 5);
+  runSteps(*edited, 5);
   EXPECT_NEAR(rod(*edited, "rope").x.col(10).z(), 1.0, 1e-12);   // held there
 }
 
 TEST(SceneEdit, attachesWhereTheRopeIsNowAndDetaches)
 {
   Running edited = make(ropes);
-  run(*edited, 60);
+  runSteps(*edited, 60);
   const RodState before = rod(*edited, "rope");
   edit(edited, Kind::attach, "rope: {hand: {nodes: [9, 10], motion: {topic: true}}}");
   const std::size_t hand = 2;
@@ -294,7 +287,7 @@ TEST(SceneEdit, attachesWhereTheRopeIsNowAndDetaches)
   EXPECT_REFUSED(*edited, Kind::attach, "rope: {hand: {nodes: [3]}}", "has a grasp hand already");
   edit(edited, Kind::detach, "hand");
   EXPECT_EQ(edited->grasps().size(), 3u);   // left, right, end
-  run(*edited, 20);
+  runSteps(*edited, 20);
   EXPECT_LT(rod(*edited, "rope").x.col(9).z(), held.position.z() + 0.07);
 }
 
@@ -303,17 +296,17 @@ TEST(SceneEdit, keepsGraspsThatWereMovedOrReleased)
   Running edited = make(ropes), untouched = make(ropes);
   for (const Running* one : {&edited, &untouched})
   {
-    run(**one, 20);
+    runSteps(**one, 20);
     (*one)->grasps().release(0);
     (*one)->grasps().attach(0, 4, 6, Hold::frame);
     (*one)->grasps().release(1);
-    run(**one, 5);
+    runSteps(**one, 5);
   }
   edit(edited, Kind::set_parameter, "wind.velocity=[0, 0, 0]");
   EXPECT_FALSE(edited->grasps().isActive(1));
   EXPECT_EQ(rod(*edited, "rope").grasps[0].first_node, 4);
-  run(*edited, 20);
-  run(*untouched, 20);
+  runSteps(*edited, 20);
+  runSteps(*untouched, 20);
   EXPECT_TRUE(bytes(*edited) == bytes(*untouched));
   EXPECT_REFUSED(*edited, Kind::attach, "rope: {hand: {nodes: [5]}}", "overlap grasp left, which holds 4 to 6");
 }
@@ -321,7 +314,7 @@ TEST(SceneEdit, keepsGraspsThatWereMovedOrReleased)
 TEST(SceneEdit, graspsOfClothTakeHoldWhereItIs)
 {
   Running edited = make(sheet);
-  run(*edited, 60);
+  runSteps(*edited, 60);
   const ClothState before = edited->state().cloths[0];
   ASSERT_LT(before.x.row(2).minCoeff(), -0.01);
   edit(edited, Kind::attach, "sheet: {hand: {edge: right, motion: {topic: true}}}");
@@ -329,28 +322,28 @@ TEST(SceneEdit, graspsOfClothTakeHoldWhereItIs)
   EXPECT_EQ(edited->state().cloths[0].pins.size(), 18u);
   const double z = edited->grasps().pose(1).position.z();
   EXPECT_LT(z, -0.01);
-  run(*edited, 20);
+  runSteps(*edited, 20);
   EXPECT_NEAR(edited->grasps().pose(1).position.z(), z, 1e-12);
   edit(edited, Kind::detach, "hand");
   EXPECT_EQ(edited->state().cloths[0].pins.size(), 9u);
   const Eigen::Matrix3Xd held = edited->state().cloths[0].x;
-  run(*edited, 20);
+  runSteps(*edited, 20);
   EXPECT_GT((edited->state().cloths[0].x.col(8) - held.col(8)).norm(), 0.01);   // a corner of the right edge
 }
 
 TEST(SceneEdit, setsWhatMayChange)
 {
   Running soft = make(ropes), same = make(ropes);
-  run(*soft, 40);
-  run(*same, 40);
+  runSteps(*soft, 40);
+  runSteps(*same, 40);
   edit(soft, Kind::set_parameter,
        "rods.rope.material.youngs_modulus=1e5\nwind.velocity=[0, 3, 0]\n"
        "rods.cable.damping={mass: 20, drag: 0.1}");
   EXPECT_EQ(soft->config().rods[0].material.youngs_modulus, 1e5);
   EXPECT_EQ(soft->defaultInputs().wind.y(), 3.0);
   EXPECT_TRUE(rod(*soft, "rope").x == rod(*same, "rope").x);
-  run(*soft, 20);
-  run(*same, 20);
+  runSteps(*soft, 20);
+  runSteps(*same, 20);
   EXPECT_LT(rod(*soft, "rope").x.row(2).minCoeff(), rod(*same, "rope").x.row(2).minCoeff() - 0.005);   // softer
   EXPECT_GT(rod(*soft, "cable").x.col(12).y(), rod(*same, "cable").x.col(12).y() + 1e-3);              // blown away
   // and back again
@@ -363,22 +356,22 @@ TEST(SceneEdit, clothMeetsASpawnedBallOnceItsContactIsTheBarrier)
   std::string text = sheet;
   text.replace(text.find("{left: {edge: left}}"), 20, "{left: {edge: left}, right: {edge: right}}");
   Running edited = make(text);
-  run(*edited, 20);
+  runSteps(*edited, 20);
   const std::string ball =
       "bodies: [{name: ball, shape: {sphere: {radius: 0.03}}, mass: 0.02, pose: {position: [0.2, 0.2, "
       "0.05]}}]";
   EXPECT_REFUSED(*edited, Kind::spawn, ball, "contact: {method: barrier}");   // its method does not change by itself
   edit(edited, Kind::set_parameter, "cloths.sheet.contact.method=barrier");
   edit(edited, Kind::spawn, ball);
-  run(*edited, 60);
+  runSteps(*edited, 60);
   EXPECT_GT(edited->state().bodies[0].X_WB.position.z(), -0.1);   // free fall: -0.4
 }
 
 TEST(SceneEdit, bodiesAreWeldedToRodsThatMove)
 {
   Running edited = make(ropes), untouched = make(ropes);
-  run(*edited, 30);
-  run(*untouched, 30);
+  runSteps(*edited, 30);
+  runSteps(*untouched, 30);
   const Eigen::Vector3d middle = rod(*edited, "rope").x.col(10);
   char place[100];
   std::snprintf(place, sizeof place, "[%.4f, %.4f, %.4f]", middle.x(), middle.y(), middle.z() - 0.05);
@@ -386,36 +379,36 @@ TEST(SceneEdit, bodiesAreWeldedToRodsThatMove)
        std::string("bodies: {name: weight, mass: 0.5, inertia: [1e-4, 1e-4, 1e-4], pose: {position: ") + place +
            "}, welds: [{rod: rope, edge: 9}]}");
   ASSERT_EQ(rod(*edited, "rope").grasps.size(), 3u);
-  run(*edited, 20);
+  runSteps(*edited, 20);
   EXPECT_LT(rod(*edited, "rope").x.col(10).z(), middle.z() - 0.01);
   EXPECT_NEAR((edited->state().bodies[1].X_WB.position - rod(*edited, "rope").x.col(10)).norm(), 0.05, 0.01);
   EXPECT_THROW(edited->reset(), SceneError);   // where the scene starts the two are not together
   // an edit in between leaves the weld where it is
-  run(*untouched, 20);
+  runSteps(*untouched, 20);
   EXPECT_TRUE(stateBytes(rod(*edited, "cable")) == stateBytes(rod(*untouched, "cable")));
   Running again = editedSimulation(*edited, {Kind::set_parameter, "wind.velocity=[0, 0, 0]"});
-  run(*edited, 10);
-  run(*again, 10);
+  runSteps(*edited, 10);
+  runSteps(*again, 10);
   EXPECT_TRUE(bytes(*edited) == bytes(*again));
   EXPECT_REFUSED(*edited, Kind::remove, "rope", "rope");
   edit(edited, Kind::remove, "weight");
   EXPECT_EQ(rod(*edited, "rope").grasps.size(), 2u);
-  run(*edited, 5);
+  runSteps(*edited, 5);
   edited->reset();
 }
 
 TEST(SceneEdit, graspsFollowABodyThatIsSpawnedWithoutAJump)
 {
   Running edited = make(ropes);
-  run(*edited, 10);
+  runSteps(*edited, 10);
   edit(edited, Kind::attach, "rope: {hand: {nodes: [10], motion: {body: gripper}}}");
   const Pose before = edited->grasps().pose(2);
   edit(edited, Kind::spawn,
        "obstacles: {name: gripper, shape: {sphere: {radius: 0.01}}, motion: {table: "
        "[[0.05, 0.5, 0.5, 1, 0, 0, 0, 1], [1.05, 0.5, 1.5, 1, 0, 0, 0, 1]]}}");
-  run(*edited, 1);
+  runSteps(*edited, 1);
   EXPECT_LT((edited->grasps().pose(2).position - before.position).norm(), 0.02);
-  run(*edited, 20);
+  runSteps(*edited, 20);
   EXPECT_GT(edited->grasps().pose(2).position.y(), before.position.y() + 0.01);
   EXPECT_REFUSED(*edited, Kind::spawn,
                  "obstacles: {name: late, shape: {sphere: {radius: 0.01}}, motion: {table: [[0, 5, 5, 5, 0, 0, 0, 1], "
@@ -426,7 +419,7 @@ TEST(SceneEdit, graspsFollowABodyThatIsSpawnedWithoutAJump)
 TEST(SceneEdit, refusesWhatDoesNotFit)
 {
   Running running = make(ropes);
-  run(*running, 5);
+  runSteps(*running, 5);
   const auto spawn = [&](const std::string& text) { return refusal(*running, Kind::spawn, text); };
   const auto has = [](const std::string& text, const std::string& part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
@@ -478,11 +471,11 @@ generate: [{chain: {links: 3, edges: 12, material: {density: 1000, youngs_modulu
 rods: [{name: rope, centerline: {straight: {from: [3, 0, 0], to: [4, 0, 0], edges: 5}}}]
 )";
   Running edited = make(chain), untouched = make(chain);
-  run(*edited, 10);
-  run(*untouched, 10);
+  runSteps(*edited, 10);
+  runSteps(*untouched, 10);
   edit(edited, Kind::spawn, "rods: [{name: more, centerline: {straight: {from: [3, 9, 0], to: [4, 9, 0], edges: 5}}}]");
-  run(*edited, 10);
-  run(*untouched, 10);
+  runSteps(*edited, 10);
+  runSteps(*untouched, 10);
   for (const char* name : {"rope", "chain_0", "chain_2"})
     EXPECT_TRUE(stateBytes(rod(*edited, name)) == stateBytes(rod(*untouched, name))) << name;
   EXPECT_REFUSED(*edited, Kind::remove, "chain_1", "was made by generate");
@@ -493,14 +486,14 @@ rods: [{name: rope, centerline: {straight: {from: [3, 0, 0], to: [4, 0, 0], edge
 TEST(SceneEdit, aSavedStateBelongsToTheEditedScene)
 {
   Running edited = make(ropes);
-  run(*edited, 5);
+  runSteps(*edited, 5);
   const std::string path = testing::TempDir() + "/slender_sim_edited_state";
   edited->save(path);
   edit(edited, Kind::set_parameter, "rods.rope.material.youngs_modulus=2e6");
   EXPECT_THROW(edited->load(path), std::runtime_error);
   edited->save(path);
   const std::string before = bytes(*edited);
-  run(*edited, 5);
+  runSteps(*edited, 5);
   edited->load(path);
   EXPECT_TRUE(bytes(*edited) == before);
   // the text of the edited scene is that scene

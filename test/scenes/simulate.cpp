@@ -12,12 +12,14 @@
 #include <gtest/gtest.h>
 
 #include "test/support/shell.h"
+#include "test/support/shipped_scenes.h"
 
 /// The program itself: exit codes, messages, files, and every scene of the package for a few steps.
 namespace {
 
 namespace fs = std::filesystem;
 
+using slender::test::kSceneFolder;
 using slender::test::Result;
 
 Result simulate(const std::string& arguments)
@@ -25,8 +27,7 @@ Result simulate(const std::string& arguments)
   return slender::test::shell(std::string(SLENDER_SIMULATE) + " " + arguments);
 }
 
-const std::string scenes = std::string(SLENDER_SOURCE_DIR) + "/config/scenes/";
-const std::string cantilever = scenes + "cantilever.yaml";
+const std::string cantilever = kSceneFolder + "cantilever.yaml";
 
 class Simulate : public testing::Test
 {
@@ -40,36 +41,26 @@ protected:
   std::string folder_;
 };
 
-std::vector<std::string> allScenes()
-{
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(scenes))
-    if (entry.path().extension() == ".yaml")
-      names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
 class Scene : public testing::TestWithParam<std::string>
 {};
 
 /// A smaller scene of the same kind, where the whole one takes long.
-std::string reduced(const std::string& name) { return name == "hair.yaml" ? " --set generate.0.hair.strands=60" : ""; }
+std::string reduced(const std::string& name) { return name == "hair" ? " --set generate.0.hair.strands=60" : ""; }
 
 TEST_P(Scene, runs)
 {
-  const Result result = simulate(scenes + GetParam() + " --duration 0.05" + reduced(GetParam()));
+  const Result result = simulate(kSceneFolder + GetParam() + ".yaml --duration 0.05" + reduced(GetParam()));
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_EQ(result.output.find("nan"), std::string::npos) << result.output;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Scene, testing::ValuesIn(allScenes()));
+INSTANTIATE_TEST_SUITE_P(All, Scene, testing::ValuesIn(slender::test::shippedScenes()));
 
 /// What hangs from a nozzle whose flow stops becomes thinner and thinner, and parts.
 TEST_F(Simulate, aThreadWhoseFlowStopsDrainsAndParts)
 {
   const Result result =
-      simulate(scenes +
+      simulate(kSceneFolder +
                "honey_robot.yaml --duration 5.5 --set threads.0.nozzle.motion=fixed"
                " --set 'threads.0.nozzle.flow={table: [[0, 6e-7], [4, 6e-7], [4.000001, 0]]}'"
                " --set 'threads.0.floor.belt={x: {table: [[0, 0.03], [2, 0.03], [2.000001, -0.03]]}, y: 0}' --csv " +
@@ -305,7 +296,7 @@ TEST_F(Simulate, writesTablesOfChosenNodes)
 TEST_F(Simulate, writesATableOfBodies)
 {
   const Result result =
-      simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.every=10 --csv " + folder_ +
+      simulate(kSceneFolder + "torsional_pendulum.yaml --duration 0.1 --set record.every=10 --csv " + folder_ +
                " --set \"obstacles=[{name: floor, shape: {plane: {}}, pose: {position: [0, 0, -2]}}]\"");
   ASSERT_EQ(result.status, 0) << result.output;
   std::ifstream file(folder_ + "/bodies.csv");
@@ -328,7 +319,7 @@ TEST_F(Simulate, writesATableOfBodies)
 
 TEST_F(Simulate, writesObjFiles)
 {
-  const Result result = simulate(scenes + "grass.yaml --duration 0.02 --obj " + folder_);
+  const Result result = simulate(kSceneFolder + "grass.yaml --duration 0.02 --obj " + folder_);
   ASSERT_EQ(result.status, 0) << result.output;
   std::ifstream file(folder_ + "/frame_000002.obj");
   ASSERT_TRUE(file);
@@ -342,8 +333,9 @@ TEST_F(Simulate, writesObjFiles)
 TEST_F(Simulate, runsIntoOneFolderAreNotMixed)
 {
   const std::string csv = " --csv " + folder_ + "/csv", obj = " --obj " + folder_ + "/obj";
-  ASSERT_EQ(simulate(scenes + "torsional_pendulum.yaml --duration 0.1 --set record.fields=[energy]" + csv + obj).status,
-            0);
+  ASSERT_EQ(
+      simulate(kSceneFolder + "torsional_pendulum.yaml --duration 0.1 --set record.fields=[energy]" + csv + obj).status,
+      0);
   EXPECT_TRUE(fs::exists(folder_ + "/csv/bodies.csv"));
   EXPECT_TRUE(fs::exists(folder_ + "/csv/energies.csv"));
   EXPECT_TRUE(fs::exists(folder_ + "/obj/frame_000010.obj"));
@@ -364,9 +356,10 @@ TEST_F(Simulate, runsIntoOneFolderAreNotMixed)
 TEST_F(Simulate, threadsDoNotChangeTheTables)
 {
   const auto table = [&](const std::string& threads) {
-    EXPECT_EQ(simulate(scenes + "grass.yaml --duration 0.2 --csv " + folder_ + "/" + threads + " --threads " + threads)
-                  .status,
-              0);
+    EXPECT_EQ(
+        simulate(kSceneFolder + "grass.yaml --duration 0.2 --csv " + folder_ + "/" + threads + " --threads " + threads)
+            .status,
+        0);
     std::ifstream file(folder_ + "/" + threads + "/nodes.csv");
     std::ostringstream text;
     text << file.rdbuf();

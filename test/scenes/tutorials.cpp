@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "study/framework/whole_file.h"
 #include "test/support/shell.h"
 
 /// The tutorials word by word: their scenes and their `simulate` commands are taken from the text, and what the text
@@ -19,14 +20,6 @@
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string contents(const std::string& path)
-{
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 std::vector<std::string> matches(const std::string& text, const std::string& pattern)
 {
@@ -82,7 +75,7 @@ protected:
   {
     folder_ = testing::TempDir() + "/slender_sim_tutorials_" + std::to_string(getpid());
     fs::create_directories(folder_);
-    text_ = contents(std::string(SLENDER_SOURCE_DIR) + "/docs/tutorials.md");
+    text_ = slender::wholeFile(std::string(SLENDER_SOURCE_DIR) + "/docs/tutorials.md");
   }
   void TearDown() override { fs::remove_all(folder_); }
 

@@ -7,12 +7,13 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/study/headlines.h"
+#include "test/support/special_numbers.h"
 
 using namespace slender::study;
 
 namespace {
 
-const double kNan = std::numeric_limits<double>::quiet_NaN();
+using slender::test::kNan;
 
 const Bar* barOf(const Headline& headline, const Figure& figure)
 {

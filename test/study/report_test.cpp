@@ -12,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "study/framework/whole_file.h"
 #include "test/support/shell.h"
 
 namespace {
@@ -19,14 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 
 using slender::test::Result;
-
-std::string contents(const fs::path& path)
-{
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 std::size_t countOf(const std::string& text, const std::string& part)
 {
@@ -51,7 +44,7 @@ protected:
     return slender::test::shell(environment + " " SLENDER_STUDY " report --quick --out " + folder_ + "/out " +
                                 arguments);
   }
-  std::string page() const { return contents(folder_ + "/out/report.html"); }
+  std::string page() const { return slender::wholeFile(folder_ + "/out/report.html"); }
 
   std::string folder_;
 };
@@ -78,7 +71,7 @@ TEST_F(Report, isOnePageWithFiguresAndTablesThatLoadsNothing)
       }
   }
   EXPECT_GE(countOf(html, "<img "), 1u);
-  const std::string results = contents(folder_ + "/out/results.md");
+  const std::string results = slender::wholeFile(folder_ + "/out/results.md");
   EXPECT_NE(results.find("| version | "), std::string::npos) << results;
   EXPECT_NE(results.find("**These are results of the quick form**"), std::string::npos);
   EXPECT_NE(html.find("worst_error_over_bound"), std::string::npos);
@@ -110,13 +103,13 @@ TEST_F(Report, goesOnWhereItWasStopped)
   const Result more = report("trouton elastica");
   ASSERT_EQ(more.status, 0) << more.output;
   EXPECT_NE(more.output.find("1 studies in"), std::string::npos) << more.output;
-  EXPECT_EQ(contents(result), mark);
+  EXPECT_EQ(slender::wholeFile(result), mark);
   EXPECT_NE(page().find("<td>mark_of_the_test</td><td class=n>42.5</td>"), std::string::npos);
   // killed while it was writing: a part of a result is none
   fs::rename(result, result.string() + ".part");
   ASSERT_EQ(report("trouton elastica").status, 0);
   EXPECT_EQ(page().find("mark_of_the_test"), std::string::npos);
-  EXPECT_NE(contents(result).find("worst_error_over_bound"), std::string::npos);
+  EXPECT_NE(slender::wholeFile(result).find("worst_error_over_bound"), std::string::npos);
 }
 
 TEST_F(Report, tellsWhichStudiesFailedAndWhy)
@@ -141,7 +134,7 @@ TEST_F(Report, namesTheVersionOfEachResult)
   ASSERT_EQ(report("trouton elastica").status, 0);
   std::ofstream(folder_ + "/out/data/trouton/version.txt") << "0.0.1, commit old";
   ASSERT_EQ(report("trouton elastica torsion").status, 0);
-  for (const std::string& page : {page(), contents(folder_ + "/out/results.md")})
+  for (const std::string& page : {page(), slender::wholeFile(folder_ + "/out/results.md")})
     EXPECT_NE(page.find("; 0.0.1, commit old: trouton"), std::string::npos) << page.substr(0, 3000);
 }
 
@@ -186,7 +179,7 @@ protected:
   /// Returns the first row of the page that has both texts.
   std::string row(const std::string& study, const std::string& text) const
   {
-    std::istringstream lines(contents(folder_ + "/out/results.md"));
+    std::istringstream lines(slender::wholeFile(folder_ + "/out/results.md"));
     for (std::string line; std::getline(lines, line);)
       if (line.rfind("| `" + study + "` |", 0) == 0 && line.find(text) != std::string::npos)
         return line;
@@ -217,7 +210,7 @@ TEST_F(Results, sayWhatIsMetMissedAndNotMeasured)
   has(row("torsion", "gripper"), "| - |");
   has(row("swing", "8 mm"), "| not in this report | at most 0.25 s (time);");
   has(row("swing", "8 mm"), "| - |");
-  const std::string page = contents(folder_ + "/out/results.md");
+  const std::string page = slender::wholeFile(folder_ + "/out/results.md");
   has(page, "Of 5 targets, **2 are met and 3 are missed**.");
   has(page, "`projection` (`iterations_max_to_1ms`)");
   has(page, "| version | 1.2.3, commit abc |");
@@ -230,7 +223,7 @@ TEST_F(Results, sayIfTheyAreOfTheQuickForm)
   result("coupled_safety", R"("penetrations": 0, "thickness_violations": 0, "nan_count": 0, "unexplained_failures": 0,
     "scenes": 20)");
   ASSERT_EQ(make().status, 0);
-  const std::string page = contents(folder_ + "/out/results.md");
+  const std::string page = slender::wholeFile(folder_ + "/out/results.md");
   EXPECT_NE(page.find("**These are results of the quick form**"), std::string::npos);
   // a target of the full form alone: a thousand scenes
   EXPECT_NE(row("coupled_safety", "stand behind").find("| not in the quick form | at least 1,000 (full form) | - |"),

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -9,12 +8,13 @@
 #include "slender_sim/study/output.h"
 #include "slender_sim/study/reference.h"
 #include "slender_sim/study/study.h"
+#include "test/support/special_numbers.h"
 
 using namespace slender::study;
 
 namespace {
 
-const double kNan = std::numeric_limits<double>::quiet_NaN();
+using slender::test::kNan;
 
 double metric(const StudyContext& context, const std::string& key)
 {

@@ -13,6 +13,8 @@
 
 namespace slender::test {
 
+constexpr double kIslandStep = 0.005, kIslandGap = 1e-3;   // [s], [m]
+
 /// A square sheet of cotton [m].
 inline std::shared_ptr<ClothModel> cotton(double size, int cells)
 {

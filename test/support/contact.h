@@ -8,6 +8,8 @@
 
 namespace slender::test {
 
+constexpr double kContactGap = 0.02, kCurveRadius = 0.05;   // [m]
+
 /// Appends a polyline as an object of a contact surface; x grows by its nodes.
 inline void addCurve(ContactSurface& surface, Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& nodes, double radius,
                      double friction = 0.0, bool closed = false)
@@ -173,5 +175,26 @@ bool bringTo(double clearance, double most, At at)
   }
   return std::abs(at(high) - clearance) < 1e-6 * most;
 }
+
+/// A surface to test barriers of width kContactGap with.
+struct ContactCase
+{
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  std::vector<Pose> solids;
+
+  ContactPotential potential(double stiffness = 3.0) const
+  {
+    ContactOptions options;
+    options.gap = kContactGap;
+    ContactPotential p(surface, options);
+    p.setStiffness(stiffness);
+    return p;
+  }
+};
+
+/// Central differences over 1e-7 m err by 1e-6 where the barrier's third derivative is at most 1e8 N/m^2 at forces of
+/// some newtons.
+constexpr double kDifferences = 2e-6;
 
 }   // namespace slender::test

@@ -75,15 +75,15 @@ public:
   }
 };
 
-struct Case
+struct TermCase
 {
   std::string name;
   std::function<std::unique_ptr<ChainTerm>(int edges, Random& random)> make;
 };
 
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const TermCase& c, std::ostream* out) { *out << c.name; }
 
-class ChainTerms : public ::testing::TestWithParam<Case>
+class ChainTerms : public ::testing::TestWithParam<TermCase>
 {
 protected:
   static constexpr int kNodes = 13;
@@ -192,7 +192,7 @@ std::unique_ptr<ChainTerm> surface(SurfaceShape shape, int edges, Random& random
   return term;
 }
 
-const std::vector<Case> kCases = {
+const std::vector<TermCase> kTermCases = {
     {"surface_of_cones", [](int edges, Random& random) { return surface(SurfaceShape::cone, edges, random); }},
     {"surface_of_cylinders", [](int edges, Random& random) { return surface(SurfaceShape::cylinder, edges, random); }},
     {"spin_inertia",
@@ -210,7 +210,7 @@ const std::vector<Case> kCases = {
        return term;
      }},
 };
-INSTANTIATE_TEST_SUITE_P(Kinds, ChainTerms, ::testing::ValuesIn(kCases),
+INSTANTIATE_TEST_SUITE_P(Kinds, ChainTerms, ::testing::ValuesIn(kTermCases),
                          [](const auto& info) { return info.param.name; });
 
 /// A thread with all its terms, longer than the pieces by which matrices are assembled and eliminated (256 nodes), and

@@ -45,7 +45,7 @@ struct Tracked
   }
 };
 
-ClothOptions options(bool one_newton_step)
+ClothOptions trackingOptions(bool one_newton_step)
 {
   ClothOptions o;
   o.one_newton_step = one_newton_step;
@@ -60,7 +60,7 @@ TEST(ClothAverages, AreExactWhateverTheGuideDoes)
     {
       Tracked t(bending);
       pinVertices(t.state, {7});
-      ClothStepper stepper(t.model, options(one));
+      ClothStepper stepper(t.model, trackingOptions(one));
       Random random(8);
       for (int k = 1; k <= 12; ++k)
       {
@@ -81,7 +81,7 @@ TEST(ClothAverages, CarryTheClothWithTheForcesOfMechanics)
   // a guide that is moved rigidly with constant acceleration carries the cloth rigidly; forces are m (a - g), of each
   // its share
   Tracked t;
-  ClothStepper stepper(t.model, options(false));
+  ClothStepper stepper(t.model, trackingOptions(false));
   const Vector3d a(3, -2, 1);
   const double h = 0.01;
   // both begin at the speed that implicit Euler's parabola has one step before
@@ -113,7 +113,7 @@ TEST(ClothAverages, HoldersBearTheirShare)
       t.model->averages[0].bounds[7] = 0.3 * weight.norm() / 16;   // of what its hat weighs
     }
     pinVertices(t.state, {7, 40});
-    ClothOptions o = options(true);
+    ClothOptions o = trackingOptions(true);
     o.linear_tolerance = 1e-4;
     ClothStepper stepper(t.model, o);
     for (int k = 0; k < 300; ++k)
@@ -135,7 +135,7 @@ TEST(ClothAverages, AreStationaryUnderTheConstraints)
   // directions with C d = 0
   Tracked t(BendingModel::hinge, 1);
   t.model->stiffness_damping = 0.0;
-  ClothOptions o = options(false);
+  ClothOptions o = trackingOptions(false);
   o.newton.tolerance = 1e-10;
   o.linear_tolerance = 1e-8;
   ClothStepper stepper(t.model, o);
@@ -233,7 +233,7 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
     ClothInputs inputs;
     inputs.pins = state.x.col(0);
     const auto solverOf = [&](ClothSolver solver, double tolerance) {
-      ClothOptions o = options(true);
+      ClothOptions o = trackingOptions(true);
       o.solver = solver;
       o.linear_tolerance = tolerance;
       return ClothStepper(model, o);
@@ -282,7 +282,7 @@ TEST(ClothAverages, AreExactWhereTheyNearlyDependOnEachOther)
   model->averages = {
       {std::make_shared<Eigen::SparseMatrix<double, Eigen::RowMajor>>(mix * *model->averages[0].weights), {}}};
   const auto& weights = *model->averages[0].weights;
-  ClothStepper stepper(model, options(true));
+  ClothStepper stepper(model, trackingOptions(true));
   ClothState state = makeClothState(*model, model->rest.vertices);
   ClothInputs inputs;
   const Matrix3Xd rest = state.x * weights.transpose();
@@ -301,7 +301,7 @@ TEST(ClothAverages, AreExactWhereTheyNearlyDependOnEachOther)
 TEST(ClothAverages, NeedNoLoadToBeMoved)
 {
   // the first motion of a sheet at rest, nothing else acts: the tolerance counts from that motion
-  ClothOptions exactly = options(true);
+  ClothOptions exactly = trackingOptions(true);
   exactly.solver = ClothSolver::conjugate_gradients;
   exactly.linear_tolerance = 1e-10;
   const auto model = quarteredSheet(BendingModel::hinge);
@@ -310,7 +310,7 @@ TEST(ClothAverages, NeedNoLoadToBeMoved)
   inputs.averages = model->rest.vertices * model->averages[0].weights->transpose();
   inputs.averages.row(2) += Eigen::RowVector4d(0.5, -0.3, 0.2, 0.1);
   ClothState a = makeClothState(*model, model->rest.vertices), b = a;
-  ClothStepper swept(model, options(true)), exact(model, exactly);
+  ClothStepper swept(model, trackingOptions(true)), exact(model, exactly);
   const StepReport report = swept.step(a, inputs, 0.01);
   ASSERT_TRUE(report.ok && exact.step(b, inputs, 0.01).ok);
   EXPECT_LT(report.linear_iterations, 60);
@@ -320,10 +320,10 @@ TEST(ClothAverages, NeedNoLoadToBeMoved)
 TEST(ClothAverages, RefuseWhatCannotBe)
 {
   Tracked t;
-  ClothOptions o = options(false);
+  ClothOptions o = trackingOptions(false);
   o.integrator = Integrator::symplectic_euler;
   EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
-  o = options(false);
+  o = trackingOptions(false);
   o.solver = ClothSolver::cholesky;
   EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
   // held vertices that leave nothing of an average
@@ -335,11 +335,11 @@ TEST(ClothAverages, RefuseWhatCannotBe)
       all.push_back(static_cast<int>(entry.col()));
     return all;
   }());
-  ClothStepper stuck(held.model, options(true));
+  ClothStepper stuck(held.model, trackingOptions(true));
   const StepReport refused = held.step(stuck, held.guide, 0.01);
   EXPECT_FALSE(refused.ok);
   EXPECT_NE(refused.message.find("hold fewer vertices"), std::string::npos) << refused.message;
-  ClothStepper stepper(t.model, options(true));
+  ClothStepper stepper(t.model, trackingOptions(true));
   const ClothState before = t.state;
   t.inputs.averages = Matrix3Xd::Zero(3, 3);
   StepReport report = stepper.step(t.state, t.inputs, 0.01);

@@ -115,7 +115,7 @@ TEST(ClothCollisions, TwistedSheet)
   });
 }
 
-Eigen::Matrix3Xd stacked(Sheets& s, int layers, int n)
+Eigen::Matrix3Xd stackedSheets(Sheets& s, int layers, int n)
 {
   for (int k = 0; k < layers; ++k)
     s.add(n, n, {0.013 * k, 0.007 * k, 2e-3 + 4.5e-3 * k}, {0.3, 0, 0}, {0, 0.3, 0});
@@ -126,7 +126,7 @@ TEST(ClothCollisions, ImpulsesConserveMomentum)
 {
   Random random(5);
   Sheets s;
-  stacked(s, 5, 5);
+  stackedSheets(s, 5, 5);
   for (Eigen::Index i = 0; i < s.x.cols(); ++i)
   {
     s.v.col(i) = random.vector(i % 3 == 0 ? 30.0 : 3.0);
@@ -166,7 +166,7 @@ TEST(ClothCollisions, ZonesConserveMomentum)
   Random random(6);
   Sheets s;
   const int layers = 8, n = 4, points = (n + 1) * (n + 1);
-  stacked(s, layers, n);
+  stackedSheets(s, layers, n);
   for (Eigen::Index i = 0; i < s.x.cols(); ++i)
   {
     const int layer = static_cast<int>(i) / points;
@@ -328,7 +328,7 @@ TEST(ClothCollisions, NothingIsCarriedOver)
 {
   Sheets s;
   s.gravity = {0, 0, -9.81};
-  stacked(s, 3, 6);
+  stackedSheets(s, 3, 6);
   s.addSolid(Plane{});
   SurfaceCollider warm(s.surface);
   for (int k = 0; k < 10; ++k)

@@ -45,7 +45,7 @@ obstacles:
   - {name: floor, shape: {plane: {}}}
 )";
 
-std::string problemOf(const char* scene, const std::vector<std::string>& overrides)
+std::string problemOfContact(const char* scene, const std::vector<std::string>& overrides)
 {
   try
   {
@@ -95,7 +95,7 @@ std::size_t intersectionsOf(const Simulation& simulation)
 }
 
 /// Steps with the scene's own inputs; every one must succeed and leave no intersection.
-StepReport run(Simulation& simulation, int steps)
+StepReport runApart(Simulation& simulation, int steps)
 {
   StepReport total;
   for (int k = 0; k < steps; ++k)
@@ -136,13 +136,13 @@ TEST(ClothContact, ReadsItsKeys)
   };
   for (const auto& [assignment, expected] : cases)
   {
-    EXPECT_NE(problemOf(one, {assignment, "cloths.0.contact.method=impulses"}).find(expected), std::string::npos)
-        << assignment << "\ngave: " << problemOf(one, {assignment});
+    EXPECT_NE(problemOfContact(one, {assignment, "cloths.0.contact.method=impulses"}).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemOfContact(one, {assignment});
   }
   const char* const body =
       "bodies=[{name: ball, mass: 1, inertia: [1, 1, 1], shape: {sphere: {radius: 0.1}}, pose: {position: [0, 0, 9]}, "
       "contact: false}]";
-  EXPECT_EQ(problemOf(one, {body}), "");
+  EXPECT_EQ(problemOfContact(one, {body}), "");
 }
 
 TEST(ClothContact, WithoutItClothTouchesNothing)
@@ -174,7 +174,7 @@ TEST(ClothContact, RestsOnEveryShape)
   {
     SCOPED_TRACE(shape);
     Simulation simulation(parseScene(one, "t", {"obstacles.0.shape=" + std::string(shape)}));
-    const StepReport report = run(simulation, 40);
+    const StepReport report = runApart(simulation, 40);
     EXPECT_GT(report.repulsions, 0);
     const Eigen::Matrix3Xd& x = simulation.state().cloths[0].x;
     EXPECT_GT(x.row(2).maxCoeff(), top + 1e-4);
@@ -185,7 +185,7 @@ TEST(ClothContact, RestsOnEveryShape)
 TEST(ClothContact, ClothsTouchEachOther)
 {
   Simulation simulation(parseScene(two, "t"));
-  const StepReport report = run(simulation, 100);
+  const StepReport report = runApart(simulation, 100);
   EXPECT_GT(report.repulsions, 0);
   const auto height = [&](int k) { return simulation.state().cloths[k].x.row(2).mean(); };
   EXPECT_NEAR(height(0), 2e-3, 5e-4);
@@ -236,27 +236,27 @@ TEST(ClothContact, SolidsPushCloth)
       "0.1]]}}]");
   overrides.push_back("obstacles=[]");
   Simulation simulation(parseScene(one, "t", overrides));
-  run(simulation, 40);
+  runApart(simulation, 40);
   EXPECT_GT(simulation.state().cloths[0].x.row(2).maxCoeff(), 0.1 + 0.015);
 }
 
 TEST(ClothContact, IntersectionsAtTheStartAreRefusedByName)
 {
-  EXPECT_EQ(problemOf(one, {}), "");
-  const std::string inside = problemOf(one, {"cloths.0.grid.corner=[-0.1, -0.1, 0.03]"});
+  EXPECT_EQ(problemOfContact(one, {}), "");
+  const std::string inside = problemOfContact(one, {"cloths.0.grid.corner=[-0.1, -0.1, 0.03]"});
   EXPECT_NE(inside.find("cloth 'sheet' at vertex "), std::string::npos) << inside;
   EXPECT_NE(inside.find(" meets 'thing'"), std::string::npos) << inside;
   EXPECT_NE(inside.find("move them apart"), std::string::npos) << inside;
-  const std::string crossing = problemOf(two, {"cloths.1.grid.sides=[[0.2, 0, 0], [0, 0.2, -0.015]]"});
+  const std::string crossing = problemOfContact(two, {"cloths.1.grid.sides=[[0.2, 0, 0], [0, 0.2, -0.015]]"});
   EXPECT_NE(crossing.find("cloth 'upper' at vertex "), std::string::npos) << crossing;
   EXPECT_NE(crossing.find(" meets cloth 'lower'"), std::string::npos) << crossing;
   const std::string mesh =
-      problemOf(one, {"obstacles.0.shape={mesh: {file: " SLENDER_SOURCE_DIR "/config/meshes/ring.obj}}",
-                      "cloths.0.grid.corner=[-0.1, -0.1, 0]"});
+      problemOfContact(one, {"obstacles.0.shape={mesh: {file: " SLENDER_SOURCE_DIR "/config/meshes/ring.obj}}",
+                             "cloths.0.grid.corner=[-0.1, -0.1, 0]"});
   EXPECT_NE(mesh.find("cloth 'sheet' at vertex "), std::string::npos) << mesh;
   EXPECT_NE(mesh.find("'thing'"), std::string::npos) << mesh;
   // outside a cylinder, but within the prism that stands for it
-  const std::string prism = problemOf(
+  const std::string prism = problemOfContact(
       one, {"obstacles.0.shape={cylinder: {radius: 0.05, length: 0.4}}",
             "obstacles.0.pose={rpy: [1.5707963267948966, 0, 0]}", "cloths.0.grid.corner=[-0.1, -0.1, 0.05000001]"});
   EXPECT_NE(prism.find("the prism that stands for it"), std::string::npos) << prism;
@@ -280,13 +280,13 @@ TEST_F(ClothStateFiles, RestartsBitEqualInTheMiddleOfContact)
       "bodies=[{name: arm, shape: {capsule: {radius: 0.02, length: 0.1}}, motion: {table: [[0, 0.3, 0.1, 0.03], [0.3, "
       "0.2, 0.1, 0.03]]}}]"};
   Simulation simulation(parseScene(two, "t", moving));
-  run(simulation, 15);
+  runApart(simulation, 15);
   simulation.save(path_);
-  const StepReport report = run(simulation, 15);
+  const StepReport report = runApart(simulation, 15);
   EXPECT_GT(report.repulsions, 0);
   Simulation again(parseScene(two, "t", moving));
   again.load(path_);
-  run(again, 15);
+  runApart(again, 15);
   for (int k = 0; k < 2; ++k)
   {
     EXPECT_EQ(again.state().cloths[k].x, simulation.state().cloths[k].x);
@@ -308,7 +308,7 @@ TEST_F(ClothStateFiles, RestartsBitEqualInTheMiddleOfContact)
 TEST_F(ClothStateFiles, StatesWithIntersectionsAreRefused)
 {
   Simulation simulation(parseScene(one, "t"));
-  run(simulation, 30);
+  runApart(simulation, 30);
   simulation.save(path_);
   Simulation larger(parseScene(one, "t", {"obstacles.0.shape.sphere.radius=0.055"}));
   const Eigen::Matrix3Xd before = larger.state().cloths[0].x;
@@ -322,7 +322,7 @@ TEST_F(ClothStateFiles, StatesWithIntersectionsAreRefused)
     EXPECT_NE(std::string(error.what()).find("meets 'thing'"), std::string::npos) << error.what();
   }
   EXPECT_EQ(larger.state().cloths[0].x, before);
-  run(larger, 30);
+  runApart(larger, 30);
 }
 
 /// A sheet on a slippery slope hangs from its upper edge: on the average over time the grasp carries the weight along
@@ -348,7 +348,7 @@ TEST(ClothContact, WrenchesHoldWhatTheSlopeDoesNotCarry)
       slope.push_back("obstacles.0.pose={position: [0.025, 0, -0.0456], rpy: [0, -0.5235987755982988, 0]}");
     }
     Simulation simulation(parseScene(one, "t", slope));
-    run(simulation, 300);
+    runApart(simulation, 300);
     Vector3d mean(0, 0, 0);
     double most = 0.0;
     const Vector3d along(0.8660254037844386, 0, 0.5), normal(-0.5, 0, 0.8660254037844386);
@@ -370,7 +370,7 @@ TEST(ClothContact, WrenchesHoldWhatTheSlopeDoesNotCarry)
 TEST(ClothContact, ReportsCollisions)
 {
   Simulation simulation(parseScene(one, "t", {"gravity=[0, 0, -2000]"}));
-  const StepReport report = run(simulation, 20);
+  const StepReport report = runApart(simulation, 20);
   EXPECT_GT(report.repulsions, 0);
   EXPECT_GT(report.impulses, 0);
 }

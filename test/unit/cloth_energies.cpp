@@ -12,12 +12,12 @@
 namespace slender::test {
 namespace {
 
-struct Sheet
+struct GridSheet
 {
   TriangleMesh mesh;
   MeshTopology topology;
 
-  explicit Sheet(GridPattern pattern, int cells = 3)
+  explicit GridSheet(GridPattern pattern, int cells = 3)
     : mesh(gridMesh(cells, cells, cells, cells, pattern)),
       topology(meshTopology(mesh))
   {
@@ -46,7 +46,7 @@ void check(Derivatives<Energy>& d, const Matrix3Xd& x, double h, double toleranc
 }
 
 /// Two triangles folded about their common edge by `angle`, the third points `height` high.
-Matrix3Xd flap(double angle, double left, double right)
+Matrix3Xd hingeCorners(double angle, double left, double right)
 {
   Matrix3Xd x(3, 4);
   x << 0, 1.3, 0.4, 0.7,                      //
@@ -64,7 +64,8 @@ TEST(HingeBending, LargeAnglesAndThinTriangles)
     for (const double height : {1.0, 0.03, 1e-3})
     {
       const HingeBending e(hinge, VectorXd::Constant(1, 2.0), VectorXd::Constant(1, 0.3));
-      const Matrix3Xd x = Eigen::AngleAxisd(1.1, random.direction()).toRotationMatrix() * flap(angle, height, 0.8);
+      const Matrix3Xd x =
+          Eigen::AngleAxisd(1.1, random.direction()).toRotationMatrix() * hingeCorners(angle, height, 0.8);
       double theta[8];
       e.angles(pointsOf(x).data(), theta);
       EXPECT_NEAR(theta[0], angle, 1e-13 / height) << height;
@@ -79,7 +80,7 @@ TEST(HingeBending, DeviationGoesTheShorterWayRound)
   Eigen::Matrix4Xi hinge(4, 1);
   hinge << 0, 1, 2, 3;
   const HingeBending e(hinge, VectorXd::Constant(1, 2.0), VectorXd::Constant(1, 3.0));
-  EXPECT_NEAR(energyOf(e, flap(-3.0, 1, 1)), std::pow(2 * M_PI - 6.0, 2), 1e-12);
+  EXPECT_NEAR(energyOf(e, hingeCorners(-3.0, 1, 1)), std::pow(2 * M_PI - 6.0, 2), 1e-12);
 }
 
 TEST(HingeBending, DegenerateFacesStayFinite)
@@ -88,7 +89,7 @@ TEST(HingeBending, DegenerateFacesStayFinite)
   hinge << 0, 1, 2, 3;
   const HingeBending e(hinge, VectorXd::Constant(1, 1.0), VectorXd::Constant(1, 0.2));
   Derivatives<HingeBending> d(e, 4, hinge);
-  Matrix3Xd line = flap(0.3, 0.0, 1.0), same = flap(0.3, 1.0, 1.0);
+  Matrix3Xd line = hingeCorners(0.3, 0.0, 1.0), same = hingeCorners(0.3, 1.0, 1.0);
   same.col(1) = same.col(0);
   for (const Matrix3Xd& x : {line, same, Matrix3Xd(Matrix3Xd::Zero(3, 4))})
   {
@@ -103,7 +104,7 @@ TEST(Membrane, TakesItsAxesAlongTheWarp)
 {
   // stretched along a direction d by s: E = area/2 E_d G^2 to leading order, with the contraction across it left free
   const MembraneModuli m = orthotropicMembrane(100, 40, 0.3, 10);
-  const Sheet s(GridPattern::irregular, 4);
+  const GridSheet s(GridPattern::irregular, 4);
   const Vector3d warp = Eigen::AngleAxisd(0.6, Vector3d::UnitZ()) * Vector3d::UnitX();
   const MembraneEnergy membrane(s.mesh, m, warp);
   const double g = 1e-4, area = 16;
@@ -121,7 +122,7 @@ TEST(Membrane, TakesItsAxesAlongTheWarp)
 TEST(Membrane, PatchTest)
 {
   Random random(13);
-  const Sheet s(GridPattern::irregular, 5);
+  const GridSheet s(GridPattern::irregular, 5);
   const MembraneEnergy membrane(s.mesh, isotropicMembrane(1e5, 0.3, 1e-3));
   Derivatives<MembraneEnergy> d(membrane, s.points(), s.mesh.triangles);
   const Eigen::Matrix3d F = Eigen::Matrix3d::Random() + 2 * Eigen::Matrix3d::Identity();

@@ -4,29 +4,10 @@
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "test/support/cloths.h"
+#include "test/support/pinned_cloth.h"
 
 namespace slender::test {
 namespace {
-
-struct Cloth
-{
-  std::shared_ptr<ClothModel> model;
-  ClothState state;
-  ClothInputs inputs;
-
-  explicit Cloth(ClothModel m)
-    : model(std::make_shared<ClothModel>(std::move(m))),
-      state(makeClothState(*model, model->rest.vertices))
-  {
-  }
-  void pin(const std::vector<int>& vertices)
-  {
-    pinVertices(state, vertices);
-    inputs.pins.resize(3, state.pins.size());
-    for (std::size_t k = 0; k < state.pins.size(); ++k)
-      inputs.pins.col(k) = state.x.col(state.pins[k]);
-  }
-};
 
 /// Soft enough for its ripples to be resolved; everything at work. Swings from two corners.
 Cloth swinging(BendingModel bending)
@@ -47,7 +28,7 @@ Cloth swinging(BendingModel bending)
   return cloth;
 }
 
-Matrix3Xd run(Cloth cloth, const ClothOptions& o, double end, int steps)
+Matrix3Xd positionsAfter(Cloth cloth, const ClothOptions& o, double end, int steps)
 {
   ClothStepper stepper(cloth.model, o);
   for (int k = 0; k < steps; ++k)
@@ -72,9 +53,9 @@ TEST(ClothIntegrators, HaveTheirOrder)
   for (const BendingModel bending : {BendingModel::isometric_nonconforming, BendingModel::hinge})
   {
     const double end = 0.16;
-    const Matrix3Xd fine = run(swinging(bending), with(Integrator::tr_bdf2), end, 640);
+    const Matrix3Xd fine = positionsAfter(swinging(bending), with(Integrator::tr_bdf2), end, 640);
     const auto error = [&](const ClothOptions& o, int steps) {
-      return (run(swinging(bending), o, end, steps) - fine).norm();
+      return (positionsAfter(swinging(bending), o, end, steps) - fine).norm();
     };
     for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
       for (const bool one_newton_step : {false, true})
@@ -222,7 +203,8 @@ TEST(ClothIntegrators, RestartBitEqual)
 TEST(ClothIntegrators, KeepTheErrorAsked)
 {
   const double end = 0.2;
-  const Matrix3Xd fine = run(swinging(BendingModel::isometric_nonconforming), with(Integrator::tr_bdf2), end, 800);
+  const Matrix3Xd fine =
+      positionsAfter(swinging(BendingModel::isometric_nonconforming), with(Integrator::tr_bdf2), end, 800);
   for (const Integrator integrator : {Integrator::tr_bdf2, Integrator::implicit_euler})
   {
     double previous = 0;

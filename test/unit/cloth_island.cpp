@@ -9,7 +9,7 @@
 namespace slender::test {
 namespace {
 
-constexpr double kStep = 0.005, kThickness = 2e-3, kGap = 1e-3;
+constexpr double kIslandThickness = 2e-3;
 
 /// Steps that succeed and keep the thickness, by the independent check.
 void expectSound(ClothIsland& island, int steps)
@@ -24,9 +24,9 @@ void expectSound(ClothIsland& island, int steps)
 
 TEST(ClothIsland, DrapesOverASphereAndFoldsOnTheFloor)
 {
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   const auto model = cotton(0.5, 8);
-  island.addCloth(model, centred(*model, {0, 0, 0}), kThickness);
+  island.addCloth(model, centred(*model, {0, 0, 0}), kIslandThickness);
   island.addSolid(Sphere{0.1}, {{0.013, 0.007, -0.11}, Eigen::Quaterniond::Identity()});
   island.addSolid(Plane{}, {{0, 0, -0.2}, Eigen::Quaterniond::Identity()});
   expectSound(island, 60);
@@ -38,9 +38,9 @@ TEST(ClothIsland, DrapesOverASphereAndFoldsOnTheFloor)
 /// In steps of 10 ms the ball moves 20 times its size.
 TEST(ClothIsland, StopsASmallFastBallBetweenItsVertices)
 {
-  ClothIsland island(0.01, kGap);
+  ClothIsland island(0.01, kIslandGap);
   const auto model = cotton(0.5, 5);
-  island.addCloth(model, centred(*model, {0, 0, 0}), kThickness, {0, 5, 30, 35});
+  island.addCloth(model, centred(*model, {0, 0, 0}), kIslandThickness, {0, 5, 30, 35});
   RigidBodyModel ball;
   ball.name = "ball";
   ball.mass = 1e-3;
@@ -56,10 +56,10 @@ TEST(ClothIsland, StopsASmallFastBallBetweenItsVertices)
 /// What one loses the other gains, up to Newton's tolerance.
 TEST(ClothIsland, ExchangesMomentumWithBodiesAndRods)
 {
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   island.gravity.setZero();
   const auto model = cotton(0.3, 5);
-  island.addCloth(model, centred(*model, {0, 0, 0}), kThickness);
+  island.addCloth(model, centred(*model, {0, 0, 0}), kIslandThickness);
   RigidBodyModel box;
   box.name = "box";
   box.mass = 0.02;
@@ -90,22 +90,23 @@ TEST(ClothIsland, ExchangesMomentumWithBodiesAndRods)
 
 TEST(ClothIsland, LayersKeepTheirThickness)
 {
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   const auto model = cotton(0.3, 6);
   for (int k = 0; k < 3; ++k)
-    island.addCloth(model, centred(*model, {0.02 * k, 0.011 * k, 0.004 * k}), kThickness);
+    island.addCloth(model, centred(*model, {0.02 * k, 0.011 * k, 0.004 * k}), kIslandThickness);
   island.addSolid(Plane{}, {{0, 0, -0.01}, Eigen::Quaterniond::Identity()});
   expectSound(island, 40);
   for (int k = 1; k < 3; ++k)
-    EXPECT_GT(island.cloths[k].state.x.row(2).mean(), island.cloths[k - 1].state.x.row(2).mean() + 0.9 * kThickness);
+    EXPECT_GT(island.cloths[k].state.x.row(2).mean(),
+              island.cloths[k - 1].state.x.row(2).mean() + 0.9 * kIslandThickness);
 }
 
 /// Vertices that are let go touch what they passed through while they were held.
 TEST(ClothIsland, KnowsWhatIsHeld)
 {
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   const auto model = cotton(0.3, 4);
-  ClothIsland::Cloth& cloth = island.addCloth(model, centred(*model, {0, 0, 0.05}), kThickness, {0, 4});
+  ClothIsland::Cloth& cloth = island.addCloth(model, centred(*model, {0, 0, 0.05}), kIslandThickness, {0, 4});
   island.addSolid(Plane{}, {{0, 0, -0.3}, Eigen::Quaterniond::Identity()});
   expectSound(island, 10);
   cloth.state.pins.clear();

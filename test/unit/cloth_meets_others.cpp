@@ -15,8 +15,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kThickness = 0.002, kRopeRadius = 0.004, kBallRadius = 0.03;   // [m]
-constexpr double kBallMass = 0.02;                                              // [kg]
+constexpr double kClothThickness = 0.002, kRopeRadius = 0.004, kBallRadius = 0.03;   // [m]
+constexpr double kBallMass = 0.02;                                                   // [kg]
 
 const std::string kSheet = R"(
 time: {step: 0.004, duration: 1, integrator: implicit_euler}
@@ -41,7 +41,7 @@ rods:
     contact: {friction: 0.3}
 )";
 
-const std::string kBall = R"(
+const std::string kThrownBall = R"(
 bodies:
   - name: ball
     mass: 0.02
@@ -60,7 +60,7 @@ std::array<Vector3d, 3> corners(const Simulation& s, Eigen::Index t)
 
 /// Smallest distance of the first rod, and of the ball, from the sheet, less thickness and radii [m]. Many places of
 /// each segment stand for its inside.
-double room(const Simulation& s)
+double roomOnSheet(const Simulation& s)
 {
   constexpr int kPlaces = 20;
   double least = 1.0;
@@ -73,24 +73,24 @@ double room(const Simulation& s)
         {
           const double u = static_cast<double>(k) / kPlaces;
           const Vector3d p = (1 - u) * rod.x.col(j) + u * rod.x.col(j + 1);
-          least = std::min(least, pointTriangleDistance(p, a, b, c) - kRopeRadius - 0.5 * kThickness);
+          least = std::min(least, pointTriangleDistance(p, a, b, c) - kRopeRadius - 0.5 * kClothThickness);
         }
     for (const RigidBodyState& body : s.state().bodies)
-      least = std::min(least, pointTriangleDistance(body.X_WB.position, a, b, c) - kBallRadius - 0.5 * kThickness);
+      least = std::min(least, pointTriangleDistance(body.X_WB.position, a, b, c) - kBallRadius - 0.5 * kClothThickness);
   }
   return least;
 }
 
 TEST(ClothMeetsOthers, RopeAndBallKeepTheThickness)
 {
-  Simulation s(parseScene(kSheet + kRope + kBall, "all"));
+  Simulation s(parseScene(kSheet + kRope + kThrownBall, "all"));
   std::size_t most = 0;
   for (int k = 0; k < 50; ++k)
   {
     const StepReport report = s.step(s.defaultInputs());
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     most = std::max(most, s.world().contacts().size());
-    ASSERT_GT(room(s), 0.0) << k;
+    ASSERT_GT(roomOnSheet(s), 0.0) << k;
   }
   EXPECT_GE(most, 10u);
   // The ball has not passed the sheet, which the rope carries. Without them it would have fallen by 0.39 m.
@@ -100,7 +100,7 @@ TEST(ClothMeetsOthers, RopeAndBallKeepTheThickness)
 
 TEST(ClothMeetsOthers, WhatOneLosesTheOtherGets)
 {
-  Simulation s(parseScene(kSheet + kBall, "free", {"gravity=[0, 0, 0]", "cloths.0.contact.friction=0"}));
+  Simulation s(parseScene(kSheet + kThrownBall, "free", {"gravity=[0, 0, 0]", "cloths.0.contact.friction=0"}));
   const auto momentum = [&] {
     Vector3d sum = kBallMass * s.state().bodies[0].velocity.linear;
     for (Eigen::Index i = 0; i < s.state().cloths[0].v.cols(); ++i)
@@ -125,7 +125,7 @@ TEST(ClothMeetsOthers, WhatOneLosesTheOtherGets)
 
 TEST(ClothMeetsOthers, SavedStatesGoOnBitByBit)
 {
-  const SceneConfig config = parseScene(kSheet + kRope + kBall, "all");
+  const SceneConfig config = parseScene(kSheet + kRope + kThrownBall, "all");
   Simulation first(config), second(config);
   second.setThreads(2);
   for (int k = 0; k < 12; ++k)
@@ -171,18 +171,18 @@ TEST(ClothMeetsOthers, TheMethodFollowsFromWhatThereIs)
   EXPECT_EQ(method(alone), ContactMethod::impulses);
   EXPECT_EQ(method(alone, {"cloths.0.contact.method=barrier"}), ContactMethod::barrier);
   EXPECT_EQ(method(kSheet + kRope), ContactMethod::barrier);
-  EXPECT_EQ(method(kSheet + kBall), ContactMethod::barrier);
+  EXPECT_EQ(method(kSheet + kThrownBall), ContactMethod::barrier);
   std::string untouched = kRope;
   untouched.erase(untouched.find("    contact:"));
   EXPECT_EQ(method(alone + untouched), ContactMethod::impulses);
-  EXPECT_NEAR(parseScene(alone, "t", {"cloths.0.contact.method=barrier"}).contact.gap, 0.5 * kThickness, 1e-15);
+  EXPECT_NEAR(parseScene(alone, "t", {"cloths.0.contact.method=barrier"}).contact.gap, 0.5 * kClothThickness, 1e-15);
   const SceneConfig mixed = parseScene(kSheet + kRope, "t", {"cloths.0.contact.method=impulses"});
   EXPECT_TRUE(std::any_of(mixed.warnings.begin(), mixed.warnings.end(), [](const std::string& warning) {
     return warning.find("pass through the rods") != std::string::npos;
   }));
   try
   {
-    parseScene(kSheet + kBall, "t", {"cloths.0.contact.method=impulses"});
+    parseScene(kSheet + kThrownBall, "t", {"cloths.0.contact.method=impulses"});
     ADD_FAILURE() << "a ball that the sheet cannot push";
   }
   catch (const SceneError& error)

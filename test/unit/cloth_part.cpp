@@ -10,7 +10,7 @@
 namespace slender::test {
 namespace {
 
-constexpr double kStep = 0.01;        // [s]
+constexpr double kPartStep = 0.01;    // [s]
 constexpr double kTolerance = 1e-8;   // of Newton's method
 
 /// Held at two corners, of which one moves, waving in the wind with damping and an extra force.
@@ -56,7 +56,7 @@ struct Busy
   }
 };
 
-ClothOptions options(ClothSolver solver, double linear_tolerance = 1e-6)
+ClothOptions partOptions(ClothSolver solver, double linear_tolerance = 1e-6)
 {
   ClothOptions o;
   o.solver = solver;
@@ -68,7 +68,7 @@ ClothOptions options(ClothSolver solver, double linear_tolerance = 1e-6)
 StepPlan implicitEuler()
 {
   StepPlan plan;
-  planStep(Integrator::implicit_euler, 1.0, kStep, 0.0, plan);
+  planStep(Integrator::implicit_euler, 1.0, kPartStep, 0.0, plan);
   return plan;
 }
 
@@ -80,25 +80,25 @@ struct Begun
 
   Begun(const Busy& cloth, const ClothOptions& o) : part(cloth.model, o)
   {
-    part.begin(cloth.state, cloth.inputs, kStep);
-    EXPECT_EQ(part.beginSubstep(plan, {0.0, kStep, kStep}), StepFailure::none);
+    part.begin(cloth.state, cloth.inputs, kPartStep);
+    EXPECT_EQ(part.beginSubstep(plan, {0.0, kPartStep, kPartStep}), StepFailure::none);
     part.beginStage(0);
   }
 };
 
-VectorXd gradientOf(const Part& part)
+VectorXd partGradient(const Part& part)
 {
   VectorXd right(part.unknowns());
   part.takeGradient(right.data());
   return -right;
 }
 
-using Case = std::tuple<BendingModel, ClothSolver, bool>;
+using PartCase = std::tuple<BendingModel, ClothSolver, bool>;
 
-class ClothPartInSteps : public ::testing::TestWithParam<Case>
+class ClothPartInSteps : public ::testing::TestWithParam<PartCase>
 {};
 
-std::string nameOf(const ::testing::TestParamInfo<Case>& info)
+std::string nameOf(const ::testing::TestParamInfo<PartCase>& info)
 {
   const auto [bending, solver, coupled] = info.param;
   const char* const solvers[] = {"automatic", "cholesky", "conjugate_gradients", "gauss_seidel"};
@@ -112,26 +112,26 @@ TEST_P(ClothPartInSteps, AreThoseOfAClothOnItsOwn)
 {
   const auto [bending, solver, coupled] = GetParam();
   Busy cloth(bending);
-  const ClothOptions o = options(solver);
+  const ClothOptions o = partOptions(solver);
   ClothStepper stepper(cloth.model, o);
   ClothPart part(cloth.model, o);
   PartDriver driver(part, coupled);
   const StepPlan plan = implicitEuler();
   const double most = 2.0 * kTolerance * part.stages().shortestEdge();
-  const double stiffness = 8.0 * (cloth.model->membrane.c11 + cloth.model->mass.maxCoeff() / (kStep * kStep));
+  const double stiffness = 8.0 * (cloth.model->membrane.c11 + cloth.model->mass.maxCoeff() / (kPartStep * kPartStep));
   int iterations = 0, own_iterations = 0;
   for (int k = 0; k < 8; ++k)
   {
     cloth.movePins(Vector3d(-0.002, 0.001, 0.003));
     ClothState reached = cloth.state;
-    part.begin(reached, cloth.inputs, kStep);
+    part.begin(reached, cloth.inputs, kPartStep);
     StepReport report;
     // in two substeps every other time
     const int parts = 1 + k % 2;
-    ASSERT_TRUE(part.accepts(reached, cloth.inputs, kStep, report)) << report.message;
+    ASSERT_TRUE(part.accepts(reached, cloth.inputs, kPartStep, report)) << report.message;
     for (int s = 0; s < parts; ++s)
     {
-      const Substep substep{s * kStep / parts, (s + 1) * kStep / parts, kStep / parts};
+      const Substep substep{s * kPartStep / parts, (s + 1) * kPartStep / parts, kPartStep / parts};
       StepPlan own;
       planStep(Integrator::implicit_euler, 1.0, substep.length, 0.0, own);
       ASSERT_EQ(part.beginSubstep(own, substep), StepFailure::none);
@@ -145,11 +145,11 @@ TEST_P(ClothPartInSteps, AreThoseOfAClothOnItsOwn)
     part.end(reached);
     if (parts == 1)
     {
-      const StepReport own = stepper.step(cloth.state, cloth.inputs, kStep);
+      const StepReport own = stepper.step(cloth.state, cloth.inputs, kPartStep);
       ASSERT_TRUE(own.ok) << own.message;
       own_iterations += own.iterations;
       EXPECT_LE((reached.x - cloth.state.x).colwise().norm().maxCoeff(), most) << k;
-      EXPECT_LE((reached.v - cloth.state.v).colwise().norm().maxCoeff(), most / kStep) << k;
+      EXPECT_LE((reached.v - cloth.state.v).colwise().norm().maxCoeff(), most / kPartStep) << k;
       EXPECT_LE((part.stages().pin_forces - stepper.pinForces()).colwise().norm().maxCoeff(), stiffness * most) << k;
       EXPECT_GT(report.max_strain, 0.0);
       EXPECT_NEAR(report.max_strain, own.max_strain, 1e-6 * own.max_strain);
@@ -161,8 +161,8 @@ TEST_P(ClothPartInSteps, AreThoseOfAClothOnItsOwn)
       for (std::size_t p = 0; p < half.pins.size(); ++p)
         first.pins.col(static_cast<Eigen::Index>(p)) =
             0.5 * (half.x.col(half.pins[p]) + cloth.inputs.pins.col(static_cast<Eigen::Index>(p)));
-      ASSERT_TRUE(stepper.step(half, first, 0.5 * kStep).ok);
-      ASSERT_TRUE(stepper.step(half, cloth.inputs, 0.5 * kStep).ok);
+      ASSERT_TRUE(stepper.step(half, first, 0.5 * kPartStep).ok);
+      ASSERT_TRUE(stepper.step(half, cloth.inputs, 0.5 * kPartStep).ok);
       // the first half's difference moves the second half's start and velocity
       EXPECT_LE((reached.x - half.x).colwise().norm().maxCoeff(), 4.0 * most) << k;
       cloth.state = half;
@@ -194,7 +194,7 @@ TEST_P(ClothPartDerivatives, AreThoseOfTheEnergy)
   cloth.state.x *= 1.1;
   cloth.state.v *= 0.1;
   cloth.movePins(Vector3d::Zero());
-  Begun begun(cloth, options(solver));
+  Begun begun(cloth, partOptions(solver));
   Part& part = begun.part;
   PartDriver driver(part, true);
   driver.begin();
@@ -210,7 +210,7 @@ TEST_P(ClothPartDerivatives, AreThoseOfTheEnergy)
   driver.moveAlong(1.0);
   ASSERT_TRUE(driver.evaluate(true).inertia.positiveDefinite());
   driver.accept();
-  const VectorXd gradient = gradientOf(part);
+  const VectorXd gradient = partGradient(part);
   ASSERT_GT(gradient.norm(), 0.0);
 
   for (int trial = 0; trial < 5; ++trial)
@@ -225,10 +225,10 @@ TEST_P(ClothPartDerivatives, AreThoseOfTheEnergy)
     const double size = 1e-6 / along.lpNorm<Eigen::Infinity>();
     driver.moveAlong(size);
     const double energy_ahead = driver.evaluate(false).energy();
-    const VectorXd ahead = gradientOf(part);
+    const VectorXd ahead = partGradient(part);
     driver.moveAlong(-size);
     const double energy_behind = driver.evaluate(false).energy();
-    const VectorXd behind = gradientOf(part);
+    const VectorXd behind = partGradient(part);
     // Central differences: rounding of 1e-16 of the energy over 1e-6 m, and third derivatives times 1e-12 m^2.
     EXPECT_NEAR((energy_ahead - energy_behind) / (2 * size), gradient.dot(along),
                 1e-6 * gradient.norm() * along.norm());
@@ -247,7 +247,7 @@ TEST_P(ClothPartDerivatives, TheHessianFarAwayIsDefinite)
   cloth.movePins(Vector3d::Zero());
   for (const bool coupled : {false, true})
   {
-    Begun begun(cloth, options(solver));
+    Begun begun(cloth, partOptions(solver));
     PartDriver driver(begun.part, coupled);
     driver.begin();
     EXPECT_TRUE(driver.evaluate(true).inertia.positiveDefinite());
@@ -276,7 +276,7 @@ TEST_P(ClothPartDerivatives, NewtonsMethodEndsFromACrumpledStart)
   cloth.movePins(Vector3d::Zero());
   for (const bool coupled : {false, true})
   {
-    Begun begun(cloth, options(solver));
+    Begun begun(cloth, partOptions(solver));
     PartDriver driver(begun.part, coupled);
     NewtonConfig newton;
     newton.tolerance = kTolerance;
@@ -322,7 +322,7 @@ TEST(ClothPart, TakesContactsIntoItsOwnMatrix)
     VectorXd directions[3];
     for (int k = 0; k < 3; ++k)   // own matrix, that of the island, own matrix without contacts
     {
-      Begun begun(cloth, options(solver, 1e-11));
+      Begun begun(cloth, partOptions(solver, 1e-11));
       Part& part = begun.part;
       part.first_point = kFirstPoint;
       if (k < 2)
@@ -351,7 +351,7 @@ TEST(ClothPart, ShowsItsVerticesAsASurface)
 {
   Busy cloth(BendingModel::hinge);
   cloth.movePins(Vector3d(0.01, 0.0, 0.02));
-  Begun begun(cloth, options(ClothSolver::cholesky));
+  Begun begun(cloth, partOptions(ClothSolver::cholesky));
   Part& part = begun.part;
   part.first_point = 3;
   part.offset = 100;
@@ -402,8 +402,8 @@ TEST(ClothPart, ShowsItsVerticesAsASurface)
   // Other vertices are held in another step.
   cloth.state.pins.pop_back();
   cloth.pin({4, 9});
-  begun.part.begin(cloth.state, cloth.inputs, kStep);
-  begun.part.beginSubstep(begun.plan, {0.0, kStep, kStep});
+  begun.part.begin(cloth.state, cloth.inputs, kPartStep);
+  begun.part.beginSubstep(begun.plan, {0.0, kPartStep, kPartStep});
   EXPECT_FALSE(part.numberUnknowns());
   EXPECT_EQ(part.unknowns(), 3 * (n - 3));
   EXPECT_EQ(part.base(4), Part::kPrescribed);
@@ -412,14 +412,14 @@ TEST(ClothPart, ShowsItsVerticesAsASurface)
 TEST(ClothPart, LimitsTurnsOfEdges)
 {
   const Busy cloth(BendingModel::none);
-  Begun begun(cloth, options(ClothSolver::cholesky));
+  Begun begun(cloth, partOptions(ClothSolver::cholesky));
   Part& part = begun.part;
   part.numberUnknowns();
   VectorXd d = VectorXd::Zero(part.unknowns());
   d[part.base(20) + 2] = 0.5;   // [m], far more than an edge
   part.takeDirection(d.data());
   EXPECT_EQ(part.stepLimit(), 1.0);   // without contact
-  begun.part.setContact({}, kStep);
+  begun.part.setContact({}, kPartStep);
   d[part.base(20) + 2] = 0.0;
   part.takeDirection(d.data());
   EXPECT_EQ(part.stepLimit(), 1.0);
@@ -461,7 +461,7 @@ TEST(ClothPart, RefusesWhatItCannotSolve)
   ClothInputs inputs = cloth.inputs;
   inputs.pins(0, 0) = NAN;
   StepReport report;
-  EXPECT_FALSE(part.accepts(cloth.state, inputs, kStep, report));
+  EXPECT_FALSE(part.accepts(cloth.state, inputs, kPartStep, report));
   EXPECT_FALSE(report.ok);
   EXPECT_NE(report.message.find("pin positions"), std::string::npos);
 }

@@ -11,7 +11,7 @@ namespace {
 constexpr double kYield = 2.0;   // [1/m]
 
 /// Equilateral triangles with edges along x.
-ClothModel strip(const Plasticity& plasticity, int cells = 4)
+ClothModel plasticStrip(const Plasticity& plasticity, int cells = 4)
 {
   ClothModel model = buildCloth("strip", gridMesh(0.1, 0.3, cells, 0, GridPattern::equilateral), 0.2,
                                 isotropicMembrane(1e6, 0.3, 1e-3));
@@ -90,7 +90,7 @@ TEST(ClothPlasticity, AReleasedStripKeepsTheResidualCurvature)
 {
   for (const int cells : {3, 6})
   {
-    auto model = std::make_shared<ClothModel>(strip({kYield, 0.0, 0.0}, cells));
+    auto model = std::make_shared<ClothModel>(plasticStrip({kYield, 0.0, 0.0}, cells));
     model->stiffness_damping = 0.3;   // it creeps back: waves would bend it beyond the yield again
     ClothState state = makeClothState(*model, model->rest.vertices);
     ClothOptions exact;
@@ -121,7 +121,7 @@ TEST(ClothPlasticity, AReleasedStripKeepsTheResidualCurvature)
 TEST(ClothPlasticity, BelowTheYieldNothingFlows)
 {
   const auto run = [](const Plasticity& plasticity) {
-    auto model = std::make_shared<ClothModel>(strip(plasticity));
+    auto model = std::make_shared<ClothModel>(plasticStrip(plasticity));
     ClothState state = makeClothState(*model, model->rest.vertices);
     ClothStepper stepper(model, {});
     roll(stepper, state, 0.8 * kYield, 5);   // mean curvature 0.4 of the yield, and waves when it is let go
@@ -144,7 +144,7 @@ TEST(ClothPlasticity, HardensAndSoftens)
   for (const double hardening : {0.3, -0.3})
     for (const int steps : {5, 40})
     {
-      auto model = std::make_shared<ClothModel>(strip({kYield, hardening, 0.0}));
+      auto model = std::make_shared<ClothModel>(plasticStrip({kYield, hardening, 0.0}));
       ClothState state = makeClothState(*model, model->rest.vertices);
       ClothStepper stepper(model, {});
       roll(stepper, state, 12.0, steps);
@@ -170,7 +170,7 @@ TEST(ClothPlasticity, HardensAndSoftens)
 /// triangles.
 TEST(ClothPlasticity, YieldDependsOnTheMeshsDirection)
 {
-  const ClothModel model = strip({kYield, 0.0, 0.0}, 24);
+  const ClothModel model = plasticStrip({kYield, 0.0, 0.0}, 24);
   PlasticFlow plastic(model);
   const auto flows = [&](bool along_x, double mean_curvature) {
     ClothState state = makeClothState(model, model.rest.vertices);
@@ -194,7 +194,7 @@ TEST(ClothPlasticity, YieldDependsOnTheMeshsDirection)
 TEST(ClothPlasticity, CreepsAtItsRateWhateverTheSteps)
 {
   const Plasticity law{kYield, 0.1, 0.4};
-  const ClothModel model = strip(law);
+  const ClothModel model = plasticStrip(law);
   PlasticFlow plastic(model);
   const Matrix3Xd x = rolled(model, 0.08);
   const VectorXd bent = anglesOf(model, x), width = widthsOf(model);
@@ -221,7 +221,7 @@ TEST(ClothPlasticity, FlowOnlyTakesEnergy)
     for (const double yield : {0.0, kYield})
       for (const double creep_time : {0.0, 0.05})
       {
-        auto model = std::make_shared<ClothModel>(strip({yield, hardening, creep_time}));
+        auto model = std::make_shared<ClothModel>(plasticStrip({yield, hardening, creep_time}));
         ClothState state = makeClothState(*model, model->rest.vertices);
         ClothStepper stepper(model, {});
         PlasticFlow plastic(*model);
@@ -243,7 +243,7 @@ TEST(ClothPlasticity, FlowOnlyTakesEnergy)
 /// A crumpled sheet moving freely loses energy in every step.
 TEST(ClothPlasticity, FreeMotionLosesEnergy)
 {
-  auto model = std::make_shared<ClothModel>(strip({1.0, 0.2, 0.02}));
+  auto model = std::make_shared<ClothModel>(plasticStrip({1.0, 0.2, 0.02}));
   ClothState state = makeClothState(*model, model->rest.vertices), elastic_state;
   Random random(8);
   for (Eigen::Index i = 0; i < state.x.cols(); ++i)
@@ -266,7 +266,7 @@ TEST(ClothPlasticity, FreeMotionLosesEnergy)
 TEST(ClothPlasticity, FlowsFromWhatCollisionsLeave)
 {
   ClothGroupModel group;
-  auto model = std::make_shared<ClothModel>(strip({0.5, 0.2, 0.0}));
+  auto model = std::make_shared<ClothModel>(plasticStrip({0.5, 0.2, 0.0}));
   group.cloths.push_back(model);
   group.contact.push_back({true, true, true, 0.3, 4e-3});
   group.solids.push_back({Capsule{0.02, 0.3}, 0.3, {}});
@@ -298,18 +298,18 @@ TEST(ClothPlasticity, FlowsFromWhatCollisionsLeave)
 
 TEST(ClothPlasticity, RefusesWhatIsNotValid)
 {
-  ClothModel flat = strip({kYield, 0, 0});
+  ClothModel flat = plasticStrip({kYield, 0, 0});
   flat.bending = BendingModel::isometric_nonconforming;
   EXPECT_THROW(PlasticFlow{flat}, std::invalid_argument);
   for (const Plasticity& bad :
        {Plasticity{-1, 0, 0}, Plasticity{NAN, 0, 0}, Plasticity{1, INFINITY, 0}, Plasticity{1, 0, -1}})
-    EXPECT_THROW(PlasticFlow(strip(bad)), std::invalid_argument);
-  auto model = std::make_shared<ClothModel>(strip({kYield, 0, 0}));
+    EXPECT_THROW(PlasticFlow(plasticStrip(bad)), std::invalid_argument);
+  auto model = std::make_shared<ClothModel>(plasticStrip({kYield, 0, 0}));
   ClothState state = makeClothState(*model, model->rest.vertices);
   state.stiffening[3] = 0;
   ClothStepper stepper(model, {});
   EXPECT_NE(stepper.step(state, {}, 0.01).message.find("stiffening"), std::string::npos);
-  ClothModel wrong = strip({});
+  ClothModel wrong = plasticStrip({});
   wrong.undeformed = Matrix3Xd::Zero(3, 5);
   EXPECT_THROW(makeClothState(wrong, wrong.rest.vertices), std::invalid_argument);
 }

@@ -4,6 +4,7 @@
 
 #include "cloth/cloth_preconditioner.h"
 #include "test/support/cloths.h"
+#include "test/support/pinned_cloth.h"
 
 namespace slender::test {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 constexpr BendingModel kBendings[] = {BendingModel::none, BendingModel::hinge, BendingModel::isometric_nonconforming,
                                       BendingModel::isometric_conforming};
 
-ClothModel sheet(BendingModel bending, int cells = 8, GridPattern pattern = GridPattern::alternating)
+ClothModel stiffSheet(BendingModel bending, int cells = 8, GridPattern pattern = GridPattern::alternating)
 {
   ClothModel model = buildCloth("sheet", gridMesh(0.5, 0.4, cells, 0, pattern), 0.2, isotropicMembrane(1e6, 0.3, 1e-3));
   model.bending = bending;
@@ -19,30 +20,10 @@ ClothModel sheet(BendingModel bending, int cells = 8, GridPattern pattern = Grid
   return model;
 }
 
-struct Cloth
-{
-  std::shared_ptr<ClothModel> model;
-  ClothState state;
-  ClothInputs inputs;
-
-  explicit Cloth(ClothModel m)
-    : model(std::make_shared<ClothModel>(std::move(m))),
-      state(makeClothState(*model, model->rest.vertices))
-  {
-  }
-  void pin(const std::vector<int>& vertices)
-  {
-    pinVertices(state, vertices);
-    inputs.pins.resize(3, state.pins.size());
-    for (std::size_t k = 0; k < state.pins.size(); ++k)
-      inputs.pins.col(k) = state.x.col(state.pins[k]);
-  }
-};
-
 /// Held at two corners, waving, with everything at work.
 Cloth busy(BendingModel bending)
 {
-  ClothModel model = sheet(bending);
+  ClothModel model = stiffSheet(bending);
   model.mass_damping = 0.3;
   model.stiffness_damping = 2e-4;
   model.wind_coefficient = 0.4;
@@ -61,7 +42,7 @@ Cloth busy(BendingModel bending)
   return cloth;
 }
 
-ClothOptions options(ClothSolver solver)
+ClothOptions solverOptions(ClothSolver solver)
 {
   ClothOptions o;
   o.solver = solver;
@@ -73,7 +54,7 @@ TEST(ClothStepper, FallsFreely)
 {
   for (const BendingModel bending : kBendings)
   {
-    Cloth cloth(sheet(bending));
+    Cloth cloth(stiffSheet(bending));
     ClothStepper stepper(cloth.model, {});
     const double h = 0.01;
     for (int k = 0; k < 5; ++k)
@@ -91,7 +72,7 @@ TEST(ClothStepper, BalancesForcesWhateverActs)
          {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
     {
       Cloth cloth = busy(bending);
-      ClothStepper stepper(cloth.model, options(solver));
+      ClothStepper stepper(cloth.model, solverOptions(solver));
       const StepReport report = stepper.step(cloth.state, cloth.inputs, 5e-3);
       ASSERT_TRUE(report.ok) << report.message;
       EXPECT_LT(report.residual, 1e-8) << toString(bending);
@@ -108,7 +89,7 @@ TEST(ClothStepper, SolversAgree)
     for (const ClothSolver solver : {ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
     {
       Cloth a = busy(bending), b = busy(bending);
-      ClothStepper direct(a.model, options(ClothSolver::cholesky)), iterative(b.model, options(solver));
+      ClothStepper direct(a.model, solverOptions(ClothSolver::cholesky)), iterative(b.model, solverOptions(solver));
       for (int k = 0; k < 4; ++k)
       {
         ASSERT_TRUE(direct.step(a.state, a.inputs, 5e-3).ok);
@@ -144,7 +125,7 @@ TEST(ClothStepper, MethodsConverge)
       return cloth.state.x;
     };
     const Matrix3Xd reference = run(Integrator::symplectic_euler, false, 8000);
-    const double size = (reference - sheet(bending).rest.vertices).norm();
+    const double size = (reference - stiffSheet(bending).rest.vertices).norm();
     const auto error = [&](Integrator integrator, bool one, int steps) {
       return (run(integrator, one, steps) - reference).norm() / size;
     };
@@ -161,7 +142,7 @@ TEST(ClothStepper, PinsCarryTheWeight)
 {
   for (const BendingModel bending : kBendings)
   {
-    Cloth cloth(sheet(bending));
+    Cloth cloth(stiffSheet(bending));
     cloth.model->mass_damping = 5.0;
     cloth.pin({0, 8, 40});
     ClothStepper stepper(cloth.model, {});
@@ -198,7 +179,7 @@ TEST(ClothStepper, UnforcedMotionLosesEnergy)
 
 TEST(ClothStepper, WindPushesTowardsItsVelocity)
 {
-  ClothModel model = sheet(BendingModel::isometric_nonconforming);
+  ClothModel model = stiffSheet(BendingModel::isometric_nonconforming);
   model.wind_coefficient = 2.0;
   for (const Integrator integrator : {Integrator::implicit_euler, Integrator::symplectic_euler})
   {
@@ -221,12 +202,12 @@ TEST(ClothStepper, RestartsBitEqual)
   for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
   {
     Cloth a = busy(BendingModel::hinge), b = busy(BendingModel::hinge);
-    ClothStepper one(a.model, options(solver)), two(b.model, options(solver));
+    ClothStepper one(a.model, solverOptions(solver)), two(b.model, solverOptions(solver));
     for (int k = 0; k < 3; ++k)
       ASSERT_TRUE(one.step(a.state, a.inputs, k == 1 ? 3e-3 : 5e-3).ok);
     ASSERT_TRUE(two.step(b.state, b.inputs, 5e-3).ok);
     ASSERT_TRUE(two.step(b.state, b.inputs, 3e-3).ok);
-    ClothStepper three(b.model, options(solver));
+    ClothStepper three(b.model, solverOptions(solver));
     ASSERT_TRUE(three.step(b.state, b.inputs, 5e-3).ok);
     EXPECT_EQ(a.state.x, b.state.x);
     EXPECT_EQ(a.state.v, b.state.v);

@@ -9,7 +9,7 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-constexpr double kThickness = 0.1, kReach = 0.02, kKept = 0.2;
+constexpr double kApproachThickness = 0.1, kReach = 0.02, kKept = 0.2;
 constexpr int kSamples = 2000;
 
 /// Checks a share of a motion against distances sampled along it; returns the smallest gap up to the share, over what
@@ -42,7 +42,7 @@ struct Draw
   MovingPoint point(int i) const { return {from[i], to[i]}; }
   Vector at(int i, double t) const { return from[i] + t * (to[i] - from[i]); }
 };
-Draw draw(Random& random, int kind)
+Draw drawMotion(Random& random, int kind)
 {
   Draw d;
   for (int i = 0; i < 4; ++i)
@@ -59,7 +59,7 @@ Draw draw(Random& random, int kind)
   if (kind >= 3 && kind <= 5)   // two pieces one above the other, about a thickness apart, that slide past each other
   {
     const double angle = kind == 3 ? random.uniform(0.1, 3.0) : kind == 4 ? 0.0 : 1e-9;
-    const double height = kThickness + (random.uniform() > 0 ? 1e-6 : 1e-10) * random.uniform(0.1, 10);
+    const double height = kApproachThickness + (random.uniform() > 0 ? 1e-6 : 1e-10) * random.uniform(0.1, 10);
     d.from[0] = {-1, 0, 0};
     d.from[1] = {1, 0, 0};
     d.from[2] = Vector(-std::cos(angle), -std::sin(angle), height);
@@ -75,7 +75,7 @@ Draw draw(Random& random, int kind)
   return d;
 }
 constexpr int kKinds = 8;
-const ApproachLimit limit{kThickness, kReach, kKept};
+const ApproachLimit limit{kApproachThickness, kReach, kKept};
 
 TEST(ContinuousCollision, SegmentsKeepTheirGap)
 {
@@ -83,11 +83,12 @@ TEST(ContinuousCollision, SegmentsKeepTheirGap)
   int stopped = 0;
   for (int k = 0; k < 1600; ++k)
   {
-    const Draw d = draw(random, k % kKinds);
+    const Draw d = drawMotion(random, k % kKinds);
     const double share = segmentsLimit(d.point(0), d.point(1), d.point(2), d.point(3), limit);
     stopped += share < 1.0;
-    checkShare(share,
-               [&](double t) { return segmentDistance(d.at(0, t), d.at(1, t), d.at(2, t), d.at(3, t)) - kThickness; });
+    checkShare(share, [&](double t) {
+      return segmentDistance(d.at(0, t), d.at(1, t), d.at(2, t), d.at(3, t)) - kApproachThickness;
+    });
     ASSERT_FALSE(HasFailure()) << "case " << k << " kind " << k % kKinds;
   }
   EXPECT_GT(stopped, 300);
@@ -99,14 +100,14 @@ TEST(ContinuousCollision, PointsKeepTheirGapFromSegmentsAndTriangles)
   int stopped = 0;
   for (int k = 0; k < 1600; ++k)
   {
-    const Draw d = draw(random, k % kKinds);
+    const Draw d = drawMotion(random, k % kKinds);
     const double segment = pointSegmentLimit(d.point(2), d.point(0), d.point(1), limit);
     checkShare(segment,
-               [&](double t) { return pointSegmentDistance(d.at(2, t), d.at(0, t), d.at(1, t)) - kThickness; });
+               [&](double t) { return pointSegmentDistance(d.at(2, t), d.at(0, t), d.at(1, t)) - kApproachThickness; });
     ASSERT_FALSE(HasFailure()) << "case " << k << " kind " << k % kKinds;
     const double triangle = pointTriangleLimit(d.point(2), d.point(0), d.point(1), d.point(3), limit);
     checkShare(triangle, [&](double t) {
-      return pointTriangleDistance(d.at(2, t), d.at(0, t), d.at(1, t), d.at(3, t)) - kThickness;
+      return pointTriangleDistance(d.at(2, t), d.at(0, t), d.at(1, t), d.at(3, t)) - kApproachThickness;
     });
     ASSERT_FALSE(HasFailure()) << "case " << k << " kind " << k % kKinds;
     stopped += segment < 1.0 || triangle < 1.0;
@@ -164,7 +165,7 @@ TEST(ContinuousCollision, TurningSolidsKeepTheirGap)
           const double u = low + (high - low) / 3, v = high - (high - low) / 3;
           (d(u) < d(v) ? high : low) = d(u) < d(v) ? v : u;
         }
-        return std::min({d(0.5 * (low + high)), d(0.0), d(1.0)}) - kThickness;
+        return std::min({d(0.5 * (low + high)), d(0.0), d(1.0)}) - kApproachThickness;
       };
       const double start = gap(0.0);
       if (start <= 0.0)

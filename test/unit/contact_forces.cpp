@@ -9,9 +9,7 @@
 namespace slender::test {
 namespace {
 
-constexpr double kGap = 0.02, kRadius = 0.05;
-
-Eigen::Matrix3Xd line(const Eigen::Vector3d& middle, const Eigen::Vector3d& along, int edges)
+Eigen::Matrix3Xd nodesAbout(const Eigen::Vector3d& middle, const Eigen::Vector3d& along, int edges)
 {
   Eigen::Matrix3Xd nodes(3, edges + 1);
   for (int i = 0; i <= edges; ++i)
@@ -26,25 +24,25 @@ struct Rods
 };
 
 /// A rod of five edges along x and one of four above it.
-Rods stacked(const Eigen::Vector3d& middle, const Eigen::Vector3d& along, double friction = 0.0)
+Rods stackedRods(const Eigen::Vector3d& middle, const Eigen::Vector3d& along, double friction = 0.0)
 {
   Rods rods;
-  addCurve(rods.surface, rods.x, line({0, 0, 0}, {1, 0, 0}, 5), kRadius, friction);
-  addCurve(rods.surface, rods.x, line(middle, along, 4), kRadius, friction);
+  addCurve(rods.surface, rods.x, nodesAbout({0, 0, 0}, {1, 0, 0}, 5), kCurveRadius, friction);
+  addCurve(rods.surface, rods.x, nodesAbout(middle, along, 4), kCurveRadius, friction);
   return rods;
 }
 
-ContactOptions options()
+ContactOptions gapOptions()
 {
   ContactOptions o;
-  o.gap = kGap;
+  o.gap = kContactGap;
   return o;
 }
 
 /// Largest change of all nodes' forces between neighbouring samples of a motion, over the largest force.
-double largestJump(int samples, const std::function<Rods(double)>& motion)
+double largestJumpOfRods(int samples, const std::function<Rods(double)>& motion)
 {
-  ContactPotential potential(motion(0.0).surface, options());
+  ContactPotential potential(motion(0.0).surface, gapOptions());
   potential.setStiffness(1.0);
   double jump = 0.0, largest = 0.0;
   Eigen::Matrix3Xd before;
@@ -62,31 +60,33 @@ double largestJump(int samples, const std::function<Rods(double)>& motion)
 }
 
 /// A continuous force's jumps shrink with the samples' distance.
-void expectContinuous(const std::function<Rods(double)>& motion)
+void expectContinuousRods(const std::function<Rods(double)>& motion)
 {
-  const double coarse = largestJump(2000, motion), fine = largestJump(20000, motion);
+  const double coarse = largestJumpOfRods(2000, motion), fine = largestJumpOfRods(20000, motion);
   EXPECT_LT(fine, 0.15 * coarse);
   EXPECT_LT(fine, 0.01);
 }
 
 TEST(ContactForces, DoNotJumpAsRodsBecomeParallel)
 {
-  static constexpr double kHeight = 2 * kRadius + 0.006;
+  static constexpr double kHeight = 2 * kCurveRadius + 0.006;
   // turning in the plane of contact, through parallel; tilting, so that the contact runs from one end to the other;
   // both, off centre
-  expectContinuous([](double s) {
+  expectContinuousRods([](double s) {
     const double angle = 0.4 * (s - 0.5);
-    return stacked({0.05, 0, kHeight}, {std::cos(angle), std::sin(angle), 0});
+    return stackedRods({0.05, 0, kHeight}, {std::cos(angle), std::sin(angle), 0});
   });
-  expectContinuous([](double s) { return stacked({0.05, 0, kHeight}, {1, 0, 0.01 * (s - 0.5)}); });
-  expectContinuous([](double s) { return stacked({0.05, 0.01, kHeight}, {1, 0.1 * (s - 0.47), 0.01 * (s - 0.5)}); });
+  expectContinuousRods([](double s) { return stackedRods({0.05, 0, kHeight}, {1, 0, 0.01 * (s - 0.5)}); });
+  expectContinuousRods([](double s) {
+    return stackedRods({0.05, 0.01, kHeight}, {1, 0.1 * (s - 0.47), 0.01 * (s - 0.5)});
+  });
 }
 
 TEST(ContactForces, DoNotJumpAsRodsSlide)
 {
   for (double angle : {0.0, 0.05, 0.7, 1.5707})
-    expectContinuous([angle](double s) {
-      return stacked({s - 0.5, 0.003, 2 * kRadius + 0.006}, {0.8 * std::cos(angle), 0.8 * std::sin(angle), 0});
+    expectContinuousRods([angle](double s) {
+      return stackedRods({s - 0.5, 0.003, 2 * kCurveRadius + 0.006}, {0.8 * std::cos(angle), 0.8 * std::sin(angle), 0});
     });
 }
 
@@ -101,14 +101,14 @@ TEST(ContactForces, HardlyShowTheNodes)
         double lowest = 1.0, highest = 0.0;
         for (int k = 0; k <= 40; ++k)
         {
-          double low = 0.0, high = kGap;
+          double low = 0.0, high = kContactGap;
           for (int i = 0; i < 50; ++i)
           {
             const double gap = 0.5 * (low + high);
             const Eigen::Vector3d along(std::cos(angle), std::sin(angle), 0);
-            Rods rods =
-                stacked(Eigen::Vector3d(0.3 * k / 40.0 - 0.15, 0, 2 * kRadius + gap) + across * along, 0.8 * along);
-            ContactPotential potential(rods.surface, options());
+            Rods rods = stackedRods(Eigen::Vector3d(0.3 * k / 40.0 - 0.15, 0, 2 * kCurveRadius + gap) + across * along,
+                                    0.8 * along);
+            ContactPotential potential(rods.surface, gapOptions());
             potential.setStiffness(1.0);
             const double energy = potential.evaluate(rods.x, {}, false);
             const double force = std::isfinite(energy) ? -gradient(potential, rods.x.cols()).row(2).tail(5).sum() : 1e9;
@@ -117,7 +117,7 @@ TEST(ContactForces, HardlyShowTheNodes)
           lowest = std::min(lowest, low);
           highest = std::max(highest, low);
         }
-        EXPECT_LT(highest - lowest, 0.08 * kGap) << load << " " << angle << " " << across;
+        EXPECT_LT(highest - lowest, 0.08 * kContactGap) << load << " " << angle << " " << across;
       }
 }
 
@@ -127,9 +127,9 @@ TEST(ContactForces, StiffnessIsTheDerivativeOfTheForce)
   Random random(5);
   for (double angle : {0.0, 0.02, 0.3, 1.2})
   {
-    const Rods rods = stacked({0.05, 0, 2 * kRadius + 0.006}, {std::cos(angle), std::sin(angle), 1e-3});
+    const Rods rods = stackedRods({0.05, 0, 2 * kCurveRadius + 0.006}, {std::cos(angle), std::sin(angle), 1e-3});
     const Eigen::Index n = rods.x.cols();
-    ContactPotential potential(rods.surface, options());
+    ContactPotential potential(rods.surface, gapOptions());
     potential.setStiffness(1.0);
     potential.evaluate(rods.x, {}, true);
     const Eigen::MatrixXd h = hessian(potential, n, true), definite = hessian(potential, n, false);
@@ -160,8 +160,8 @@ TEST(ContactForces, NewtonConverges)
   for (double angle : {0.0, 0.01, 0.2, 1.4})
     for (double weight : {1e-3, 0.1, 10.0})
     {
-      Rods rods = stacked({0.05, 0.01, 2 * kRadius + 0.015}, {std::cos(angle), std::sin(angle), 2e-3});
-      ContactPotential potential(rods.surface, options());
+      Rods rods = stackedRods({0.05, 0.01, 2 * kCurveRadius + 0.015}, {std::cos(angle), std::sin(angle), 2e-3});
+      ContactPotential potential(rods.surface, gapOptions());
       potential.setStiffness(1.0);
       const Eigen::Index n = rods.x.cols();
       const Eigen::Matrix3Xd rest = rods.x;
@@ -205,7 +205,7 @@ TEST(ContactForces, NewtonConverges)
         rods.x += share * move;
         ASSERT_GT(potential.clearance(rods.x, {}), 0.0);
       }
-      EXPECT_LT(potential.smallestGap(), kGap);
+      EXPECT_LT(potential.smallestGap(), kContactGap);
       EXPECT_LT(iterations, 40) << "angle " << angle << " weight " << weight;
     }
 }
@@ -215,10 +215,10 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
   constexpr double kStep = 0.01, kFriction = 0.4;
   ContactSurface surface;
   Eigen::Matrix3Xd x;
-  addCurve(surface, x, line({0, 0, kRadius + 0.008}, {0.3, 0, 0}, 1), kRadius, 0.1);
+  addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, 0.1);
   surface.solids.push_back({Plane{}, 1.6, {}});   // geometric mean 0.4
   const std::vector<Pose> solids(1);
-  ContactPotential potential(surface, options());
+  ContactPotential potential(surface, gapOptions());
   potential.setStiffness(2.0);
   potential.begin(x, solids, kStep);
   potential.evaluate(x, solids, false);
@@ -226,7 +226,7 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
   EXPECT_EQ(potential.terms()[1].force.norm(), 0.0);
   const double normal = potential.terms()[0].force.norm();
   const Eigen::Vector3d side(0.6, 0.8, 0);
-  const double full = options().slip_speed * kStep;
+  const double full = gapOptions().slip_speed * kStep;
   for (double slip : {0.1 * full, full, 20 * full})
   {
     const Eigen::Matrix3Xd there = x.colwise() + slip * side;
@@ -259,13 +259,13 @@ TEST(ContactFriction, NewtonFindsTheNarrowRangeInWhichAContactSticks)
   constexpr double kStep = 0.01, kFriction = 0.4;
   ContactSurface surface;
   Eigen::Matrix3Xd x;
-  addCurve(surface, x, line({0, 0, kRadius + 0.008}, {0.3, 0, 0}, 1), kRadius, kFriction);
+  addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, kFriction);
   surface.solids.push_back({Plane{}, kFriction, {}});
   const std::vector<Pose> solids(1);
-  ContactPotential potential(surface, options());
+  ContactPotential potential(surface, gapOptions());
   potential.begin(x, solids, kStep);
   potential.evaluate(x, solids, false);
-  const double most = kFriction * potential.terms()[0].force.norm(), full = options().slip_speed * kStep;
+  const double most = kFriction * potential.terms()[0].force.norm(), full = gapOptions().slip_speed * kStep;
   const double spring = most / (1e4 * full);   // a body that is easily moved
   const Eigen::Vector3d side(0.6, 0.8, 0);
   double slip = 50.0 * full, unbalanced = most;
@@ -287,8 +287,8 @@ TEST(ContactFriction, NewtonFindsTheNarrowRangeInWhichAContactSticks)
 
 TEST(ContactForces, FrictionBetweenRodsIsTheGradient)
 {
-  Rods rods = stacked({0.05, 0.01, 2 * kRadius + 0.006}, {0.8, 0.3, 0.001}, 0.5);
-  ContactPotential potential(rods.surface, options());
+  Rods rods = stackedRods({0.05, 0.01, 2 * kCurveRadius + 0.006}, {0.8, 0.3, 0.001}, 0.5);
+  ContactPotential potential(rods.surface, gapOptions());
   potential.setStiffness(1.0);
   potential.begin(rods.x, {}, 0.01);
   Random random(2);

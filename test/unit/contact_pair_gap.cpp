@@ -14,7 +14,7 @@ const std::vector<ConvexPiece> pieces{
     Plane{}, Sphere{0.3}, Sphere{0.02}, Box{{0.4, 0.3, 0.6}}, Cylinder{0.3, 0.5}, Capsule{0.02, 0.5}, triangle};
 
 /// A triangle of any kind: general, with an edge along an axis, flat along a side of a box, and a needle.
-void draw(Random& random, int kind, Vector (&corner)[3])
+void drawTriangle(Random& random, int kind, Vector (&corner)[3])
 {
   for (Vector& c : corner)
     c = random.vector(0.7);
@@ -29,7 +29,7 @@ void draw(Random& random, int kind, Vector (&corner)[3])
     corner[2] = corner[0] + 0.6 * (corner[1] - corner[0]) + 1e-5 * random.vector();
 }
 
-constexpr double kSoftness = 0.5;   // of pair_gap.cpp
+constexpr double kPairGapSoftness = 0.5;   // of pair_gap.cpp
 
 TEST(PairGap, OfATriangleAndASolidIsTheOnlyMinimum)
 {
@@ -40,12 +40,12 @@ TEST(PairGap, OfATriangleAndASolidIsTheOnlyMinimum)
     for (int k = 0; k < 1500; ++k)
     {
       Vector z[3];
-      draw(random, k % 4, z);
+      drawTriangle(random, k % 4, z);
       const PairGap soft = facePieceGap(z, 3, kThickness, pieces[shape]);
       const auto value = [&](const Vector& w) {
         const double g =
             pieceDistance(pieces[shape], w[0] * z[0] + w[1] * z[1] + w[2] * z[2], Vector::Zero()).distance - kThickness;
-        return g / (1.0 - kSoftness * (1.5 * w.squaredNorm() - 0.5));
+        return g / (1.0 - kPairGapSoftness * (1.5 * w.squaredNorm() - 0.5));
       };
       const Vector place = soft.place.head<3>();
       if (soft.gap <= 0.0)
@@ -82,7 +82,7 @@ TEST(PairGap, PlanesSeparateTrianglesFromSolids)
     for (int k = 0; k < 2000; ++k)
     {
       Vector z[3];
-      draw(random, k % 4, z);
+      drawTriangle(random, k % 4, z);
       double distance = 1e9;   // by places of the triangle
       for (int i = 0; i <= 40; ++i)
         for (int j = 0; i + j <= 40; ++j)
@@ -115,7 +115,7 @@ TEST(PairGap, OfAPointAndATriangleIsTheDistance)
   for (int k = 0; k < 4000; ++k)
   {
     Vector z[3];
-    draw(random, k % 4, z);
+    drawTriangle(random, k % 4, z);
     const Vector p = random.vector(0.7);
     const PairGap gap = pointTriangleGap(p, z[0], z[1], z[2], 0.01);
     const double distance = pointTriangleDistance(p, z[0], z[1], z[2]);

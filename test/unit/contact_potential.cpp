@@ -6,9 +6,7 @@
 namespace slender::test {
 namespace {
 
-constexpr double kGap = 0.02, kRadius = 0.05;
-
-Eigen::Matrix3Xd line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges)
+Eigen::Matrix3Xd nodesBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges)
 {
   Eigen::Matrix3Xd nodes(3, edges + 1);
   for (int i = 0; i <= edges; ++i)
@@ -16,33 +14,13 @@ Eigen::Matrix3Xd line(const Eigen::Vector3d& from, const Eigen::Vector3d& to, in
   return nodes;
 }
 
-struct Case
+ContactCase twoRods(const Eigen::Vector3d& offset, double angle, double tilt, double height)
 {
-  ContactSurface surface;
-  Eigen::Matrix3Xd x;
-  std::vector<Pose> solids;
-
-  ContactPotential potential(double stiffness = 3.0) const
-  {
-    ContactOptions options;
-    options.gap = kGap;
-    ContactPotential p(surface, options);
-    p.setStiffness(stiffness);
-    return p;
-  }
-};
-
-// Central differences over 1e-7 m where the barrier's third derivative is at most 1e8 N/m^2 at forces of some newtons:
-// 1e-6.
-constexpr double kDifferences = 2e-6;
-
-Case twoRods(const Eigen::Vector3d& offset, double angle, double tilt, double height)
-{
-  Case c;
-  addCurve(c.surface, c.x, line({-0.5, 0, 0}, {0.5, 0, 0}, 3), kRadius);
+  ContactCase c;
+  addCurve(c.surface, c.x, nodesBetween({-0.5, 0, 0}, {0.5, 0, 0}, 3), kCurveRadius);
   const Eigen::Vector3d along(std::cos(angle), std::sin(angle), tilt),
-      middle = offset + Eigen::Vector3d(0, 0, 2 * kRadius + height);
-  addCurve(c.surface, c.x, line(middle - 0.5 * along, middle + 0.5 * along, 3), kRadius);
+      middle = offset + Eigen::Vector3d(0, 0, 2 * kCurveRadius + height);
+  addCurve(c.surface, c.x, nodesBetween(middle - 0.5 * along, middle + 0.5 * along, 3), kCurveRadius);
   return c;
 }
 
@@ -53,7 +31,7 @@ TEST(ContactPotential, ForceOfRodsIsTheGradient)
       for (double tilt : {0.0, 1e-3})
         for (double along : {0.0, 0.11, 1.0 / 6})
         {
-          Case c = twoRods({along, 0.003, 0}, angle, tilt, height);
+          ContactCase c = twoRods({along, 0.003, 0}, angle, tilt, height);
           ContactPotential p = c.potential();
           EXPECT_LT(gradientError(p, c.x, c.solids), kDifferences)
               << height << " " << angle << " " << tilt << " " << along;
@@ -75,9 +53,9 @@ TEST(ContactPotential, ForceOfSolidsIsTheGradient)
     int checked = 0;
     for (int k = 0; k < 40; ++k)
     {
-      Case c;
+      ContactCase c;
       const Eigen::Vector3d e = 0.4 * random.direction(), n = random.direction();
-      addCurve(c.surface, c.x, line(-0.5 * e, 0.5 * e, 2), kRadius);
+      addCurve(c.surface, c.x, nodesBetween(-0.5 * e, 0.5 * e, 2), kCurveRadius);
       c.surface.solids.push_back({shape, -1.0, {}});
       c.solids.push_back({Eigen::Vector3d::Zero(), random.rotation()});
       ContactPotential p = c.potential();
@@ -88,9 +66,9 @@ TEST(ContactPotential, ForceOfSolidsIsTheGradient)
         const double s = 0.5 * (low + high);
         c.solids[0].position = s * n;
         const double clear = p.clearance(c.x, c.solids);
-        (s > 0.0 && clear > kGap / 3 ? high : low) = s;
+        (s > 0.0 && clear > kContactGap / 3 ? high : low) = s;
       }
-      if (std::abs(p.clearance(c.x, c.solids) - kGap / 3) > 1e-6)
+      if (std::abs(p.clearance(c.x, c.solids) - kContactGap / 3) > 1e-6)
         continue;   // a plane that n does not leave
       EXPECT_LT(gradientError(p, c.x, c.solids), kDifferences) << shape.index() << " case " << k;
       ++checked;

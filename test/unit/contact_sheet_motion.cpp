@@ -10,7 +10,7 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-constexpr double kGap = 0.004, kThickness = 0.006;
+constexpr double kMotionGap = 0.004, kMotionThickness = 0.006;
 
 struct Scene
 {
@@ -21,7 +21,7 @@ struct Scene
   ContactPotential potential() const
   {
     ContactOptions options;
-    options.gap = kGap;
+    options.gap = kMotionGap;
     return ContactPotential(surface, options);
   }
   void addCloth(const TriangleMesh& mesh, const Vector& middle, const Eigen::Quaterniond& turn)
@@ -30,7 +30,7 @@ struct Scene
     Eigen::Matrix3Xd corners = mesh.vertices;
     for (Eigen::Index i = 0; i < corners.cols(); ++i)
       corners.col(i) = middle + turn * Vector(corners.col(i) - centre);
-    addSheet(surface, x, corners, mesh.triangles, kThickness, 0.3).rest =
+    addSheet(surface, x, corners, mesh.triangles, kMotionThickness, 0.3).rest =
         std::make_shared<Eigen::Matrix3Xd>(mesh.vertices);
   }
   void addRod(const Vector& from, const Vector& to, int edges)
@@ -66,7 +66,7 @@ Scene heap(Random& random)
       s.addSolid(shapes[static_cast<std::size_t>(random.uniform(0.0, 4.999))],
                  {random.vector(0.15), random.rotation()});
     }
-    if (s.potential().clearance(s.x, s.solids) > 0.1 * kGap)
+    if (s.potential().clearance(s.x, s.solids) > 0.1 * kMotionGap)
       return s;
   }
 }
@@ -135,7 +135,7 @@ TEST(ContactSheetMotion, NothingPassesUpToTheLimit)
     if (share < 1.0)
     {
       ++stopped;
-      EXPECT_LT(p.clearance(moves.points(s, share), moves.poses(s, share)), 0.3 * kGap) << "case " << k;
+      EXPECT_LT(p.clearance(moves.points(s, share), moves.poses(s, share)), 0.3 * kMotionGap) << "case " << k;
       // and there the barrier acts
       EXPECT_GT(p.evaluate(moves.points(s, share), moves.poses(s, share), false), 0.0) << "case " << k;
     }
@@ -159,7 +159,7 @@ TEST(ContactSheetMotion, NothingTunnels)
       std::vector<Pose> end = s.solids;
       end[0].position.z() -= 0.2;
       ContactPotential p = s.potential();
-      ASSERT_EQ(p.clearance(s.x, s.solids), kGap);
+      ASSERT_EQ(p.clearance(s.x, s.solids), kMotionGap);
       const double share = p.stepLimit(s.x, s.x, s.solids, end);
       EXPECT_LT(share, 0.6) << shape.index() << " at " << at.transpose();
       // the same, if the cloth moves
@@ -202,7 +202,7 @@ TEST(ContactSheetMotion, TermsDependOnTheConfigurationOnly)
         ASSERT_EQ(p.terms()[i].force, fresh.terms()[i].force);
       // Gaps are softened to no more than 1 / (1 - 0.32)^2 of the distance.
       const double room = fresh.clearance(x, solids);
-      if (room > 0.0 && room < 0.45 * kGap)
+      if (room > 0.0 && room < 0.45 * kMotionGap)
       {
         EXPECT_GT(fresh.terms().size(), 0u);
       }
@@ -228,7 +228,7 @@ TEST(ContactSheetMotion, FallsOntoATable)
   const Eigen::Matrix3Xd there = s.x + share * (end - s.x);
   EXPECT_GT(p.evaluate(there, s.solids, true), 0.0);
   EXPECT_EQ(p.terms().size(), 121u);   // each vertex once
-  EXPECT_NEAR(there.row(2).minCoeff(), 0.5 * kThickness + 0.21 * kGap, 0.03 * kGap);
+  EXPECT_NEAR(there.row(2).minCoeff(), 0.5 * kMotionThickness + 0.21 * kMotionGap, 0.03 * kMotionGap);
 }
 
 /// What something else than motion brought too near is thinned, and can begin a step.

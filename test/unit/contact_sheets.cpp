@@ -11,30 +11,18 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-constexpr double kGap = 0.02, kThickness = 0.03, kRadius = 0.02;
+constexpr double kSheetThickness = 0.03, kThinRadius = 0.02;
 
-struct Case
+struct SheetCase : ContactCase
 {
-  ContactSurface surface;
-  Eigen::Matrix3Xd x;
-  std::vector<Pose> solids;
-
-  ContactPotential potential(double stiffness = 3.0) const
-  {
-    ContactOptions options;
-    options.gap = kGap;
-    ContactPotential p(surface, options);
-    p.setStiffness(stiffness);
-    return p;
-  }
   void addTriangle(const Vector& a, const Vector& b, const Vector& c, double friction = 0.0)
   {
     Eigen::Matrix3Xd corners(3, 3);
     corners << a, b, c;
-    addSheet(surface, x, corners, Eigen::Vector3i(0, 1, 2), kThickness, friction);
+    addSheet(surface, x, corners, Eigen::Vector3i(0, 1, 2), kSheetThickness, friction);
   }
   /// Moves the last `count` points along a direction until the least distance is as given.
-  bool bring(int count, const Vector& direction, double clearance = kGap / 3)
+  bool bring(int count, const Vector& direction, double clearance = kContactGap / 3)
   {
     ContactPotential p = potential();
     const Eigen::Matrix3Xd start = x;
@@ -46,17 +34,14 @@ struct Case
   }
 };
 
-// Central differences over 1e-7 m where the barrier's third derivative is at most 1e8 N/m^2 at forces of some newtons:
-// 1e-6.
-constexpr double kDifferences = 2e-6;
 // differences of forces over 1e-7 m; rows of less than a thousandth of a pair's stiffness are left out
 constexpr double kSecondDifferences = 2e-3;
 
 /// A triangle, and one above it: in any position, parallel to it, a corner above the inside, above an edge, above a
 /// corner; parallel edges; a needle.
-Case twoTriangles(Random& random, int kind)
+SheetCase twoTriangles(Random& random, int kind)
 {
-  Case c;
+  SheetCase c;
   const Eigen::Quaterniond turn = random.rotation();
   const Vector a = turn * Vector(-0.2, -0.1, 0), b = turn * Vector(0.25, -0.1, 0), d = turn * Vector(0, 0.2, 0);
   Vector u = 0.3 * random.direction(), v = 0.3 * random.direction(), w = 0.3 * random.direction(), shift(0, 0, 0);
@@ -94,7 +79,7 @@ TEST(ContactSheets, ForceOfTrianglesIsTheGradient)
   for (int kind = 0; kind < 7; ++kind)
     for (int k = 0; k < 30; ++k)
     {
-      Case c = twoTriangles(random, kind);
+      SheetCase c = twoTriangles(random, kind);
       ContactPotential p = c.potential();
       const double energy = p.evaluate(c.x, {}, false);
       ASSERT_TRUE(std::isfinite(energy)) << kind;
@@ -113,7 +98,7 @@ TEST(ContactSheets, StiffnessOfTrianglesIsTheDerivativeOfTheForce)
   for (int kind : {0, 1, 2, 5, 6})
     for (int k = 0; k < 30; ++k)
     {
-      Case c = twoTriangles(random, kind);
+      SheetCase c = twoTriangles(random, kind);
       ContactPotential p = c.potential();
       if (!(p.evaluate(c.x, {}, false) > 0.0))
         continue;
@@ -125,9 +110,9 @@ TEST(ContactSheets, StiffnessOfTrianglesIsTheDerivativeOfTheForce)
 }
 
 /// A rod of three segments that lies on a triangle, hits it with its end, or is met by its corner.
-Case rodAndTriangle(Random& random, int kind)
+SheetCase rodAndTriangle(Random& random, int kind)
 {
-  Case c;
+  SheetCase c;
   c.addTriangle({-0.4, -0.3, 0}, {0.5, -0.3, 0}, {0, 0.4, 0});
   const Vector along = kind == 0   ? Vector(random.uniform(), random.uniform(), 0)
                        : kind == 1 ? Vector(0.5 * random.uniform(), 0.5 * random.uniform(), 1)
@@ -137,7 +122,7 @@ Case rodAndTriangle(Random& random, int kind)
     nodes.col(i) = (0.2 * i - (kind == 1 ? 0.0 : 0.3)) * along.normalized() + 0.1 * Vector(random.uniform(), 0, 0);
   if (kind == 2)
     nodes.colwise() += Vector(0.45, -0.25, 0);   // near a corner
-  addCurve(c.surface, c.x, nodes, kRadius);
+  addCurve(c.surface, c.x, nodes, kThinRadius);
   c.bring(4, kind == 2 ? Vector(random.direction()) : Vector(Vector::UnitZ()));
   return c;
 }
@@ -149,7 +134,7 @@ TEST(ContactSheets, ForceOfRodsOnTrianglesIsTheGradient)
   for (int kind = 0; kind < 3; ++kind)
     for (int k = 0; k < 40; ++k)
     {
-      Case c = rodAndTriangle(random, kind);
+      SheetCase c = rodAndTriangle(random, kind);
       ContactPotential p = c.potential();
       const double energy = p.evaluate(c.x, {}, false);
       ASSERT_TRUE(std::isfinite(energy)) << kind;
@@ -173,9 +158,9 @@ std::vector<Shape> shapes()
 }
 
 /// A triangle of which some corners move as prescribed, and a solid around its free part that is turned, or not.
-Case triangleOnSolid(Random& random, const Shape& shape, unsigned char driven, bool turned)
+SheetCase triangleOnSolid(Random& random, const Shape& shape, unsigned char driven, bool turned)
 {
-  Case c;
+  SheetCase c;
   c.addTriangle(0.3 * random.direction(), 0.3 * random.direction(), 0.3 * random.direction());
   if (!turned)
     c.x.row(2).setZero();
@@ -203,7 +188,7 @@ TEST(ContactSheets, ForceOfSolidsIsTheGradient)
       int checked = 0;
       for (int k = 0; k < 80 && checked < 12; ++k)
       {
-        Case c = triangleOnSolid(random, shape, driven, k % 2);
+        SheetCase c = triangleOnSolid(random, shape, driven, k % 2);
         const Vector n = k % 2 ? random.direction() : Vector(Vector::UnitZ());
         if (!c.bring(3, n))
           continue;   // a plane that n does not leave
@@ -225,7 +210,7 @@ TEST(ContactSheets, StiffnessOnFlatSidesIsTheDerivativeOfTheForce)
   for (const Shape& shape : std::vector<Shape>{Plane{}, Box{{2.0, 2.0, 0.1}}})
     for (int k = 0; k < 20; ++k)
     {
-      Case c = triangleOnSolid(random, shape, 0, false);
+      SheetCase c = triangleOnSolid(random, shape, 0, false);
       c.x.row(2) = 1e-3 * random.numbers(3).transpose();
       ASSERT_TRUE(c.bring(3, Vector::UnitZ()));
       ContactPotential p = c.potential();
@@ -237,14 +222,14 @@ TEST(ContactSheets, StiffnessOnFlatSidesIsTheDerivativeOfTheForce)
 // ---- continuity
 
 /// Largest change of all points' forces between neighbouring samples of a motion, over the largest force.
-double largestJump(int samples, const std::function<Case(double)>& motion)
+double largestJumpOfSheets(int samples, const std::function<SheetCase(double)>& motion)
 {
   ContactPotential potential = motion(0.0).potential();
   double jump = 0.0, largest = 0.0;
   Eigen::Matrix3Xd before;
   for (int k = 0; k <= samples; ++k)
   {
-    const Case c = motion(static_cast<double>(k) / samples);
+    const SheetCase c = motion(static_cast<double>(k) / samples);
     EXPECT_TRUE(std::isfinite(potential.evaluate(c.x, c.solids, false)));
     const Eigen::Matrix3Xd g = gradient(potential, c.x.cols());
     if (k > 0)
@@ -257,32 +242,32 @@ double largestJump(int samples, const std::function<Case(double)>& motion)
 }
 
 /// A continuous force's jumps shrink with the samples' distance.
-void expectContinuous(const std::function<Case(double)>& motion)
+void expectContinuousSheets(const std::function<SheetCase(double)>& motion)
 {
-  const double coarse = largestJump(1000, motion), fine = largestJump(10000, motion);
+  const double coarse = largestJumpOfSheets(1000, motion), fine = largestJumpOfSheets(10000, motion);
   EXPECT_LT(fine, 0.15 * coarse);
   EXPECT_LT(fine, 0.02);
 }
 
 /// Two cells of cloth around a diagonal.
-Case cells()
+SheetCase cells()
 {
-  Case c;
+  SheetCase c;
   Eigen::Matrix3Xd corners(3, 4);
   corners << -0.3, 0.3, 0.3, -0.3, -0.3, -0.3, 0.3, 0.3, 0, 0, 0, 0;
   Eigen::Matrix3Xi triangles(3, 2);
   triangles << 0, 0, 1, 2, 2, 3;
-  addSheet(c.surface, c.x, corners, triangles, kThickness);
+  addSheet(c.surface, c.x, corners, triangles, kSheetThickness);
   return c;
 }
 
 TEST(ContactSheets, ForcesDoNotJumpAsACornerSlides)
 {
   for (double angle : {0.0, 0.4, 0.785398, 1.2})   // over the inside, the diagonal, outer edges, a corner
-    expectContinuous([angle](double s) {
-      Case c = cells();
+    expectContinuousSheets([angle](double s) {
+      SheetCase c = cells();
       const Vector tip =
-          (s - 0.5) * Vector(std::cos(angle), std::sin(angle), 0) + Vector(0, 0, kThickness + 0.3 * kGap);
+          (s - 0.5) * Vector(std::cos(angle), std::sin(angle), 0) + Vector(0, 0, kSheetThickness + 0.3 * kContactGap);
       c.addTriangle(tip, tip + Vector(0.2, 0.1, 0.3), tip + Vector(-0.2, 0.15, 0.4));
       return c;
     });
@@ -292,13 +277,13 @@ TEST(ContactSheets, ForcesDoNotJumpAsPiecesBecomeParallel)
 {
   // a triangle that turns through parallel above cloth, a box, and a mesh
   for (int partner = 0; partner < 4; ++partner)
-    expectContinuous([partner](double s) {
-      Case c;
-      double height = 0.5 * kThickness + 0.4 * kGap;
+    expectContinuousSheets([partner](double s) {
+      SheetCase c;
+      double height = 0.5 * kSheetThickness + 0.4 * kContactGap;
       if (partner == 0)
       {
         c = cells();
-        height += 0.5 * kThickness;
+        height += 0.5 * kSheetThickness;
       }
       const double tilt = 0.04 * (s - 0.47);
       const Vector e(std::cos(tilt), 0, std::sin(tilt)), f(0, 1, 0.3 * tilt);
@@ -326,7 +311,7 @@ TEST(ContactSheets, ForcesAndTorquesSumToZero)
   int terms = 0;
   for (int k = 0; k < 60; ++k)
   {
-    Case c = twoTriangles(random, k % 7);
+    SheetCase c = twoTriangles(random, k % 7);
     if (k % 2)
     {
       c = rodAndTriangle(random, k / 2 % 3);
@@ -364,8 +349,8 @@ TEST(ContactSheets, ForcesAndTorquesSumToZero)
 TEST(ContactSheets, NeighboursAndPiecesNearAtRestDoNotRepel)
 {
   const TriangleMesh mesh = gridMesh(0.2, 0.2, 8, 8, GridPattern::one_diagonal);   // edges shorter than the thickness
-  Case c;
-  ContactObject& sheet = addSheet(c.surface, c.x, mesh.vertices, mesh.triangles, kThickness);
+  SheetCase c;
+  ContactObject& sheet = addSheet(c.surface, c.x, mesh.vertices, mesh.triangles, kSheetThickness);
   ContactPotential all = c.potential();
   EXPECT_FALSE(std::isfinite(all.evaluate(c.x, {}, false)));
   sheet.rest = std::make_shared<Eigen::Matrix3Xd>(mesh.vertices);
@@ -381,16 +366,16 @@ TEST(ContactSheets, NeighboursAndPiecesNearAtRestDoNotRepel)
 
 TEST(ContactSheets, WhatIsDrivenPassesThroughWhatIsDriven)
 {
-  Case c;
+  SheetCase c;
   c.addTriangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   c.addTriangle({0.2, 0.2, -0.3}, {0.3, 0.2, 0.5}, {0.2, 0.3, 0.5});
   EXPECT_LT(c.potential().clearance(c.x, {}), 0.0);   // no corner or edge is near, but it passes through
   for (ContactTriangle& t : c.surface.triangles)
     t.driven = 7;
-  EXPECT_EQ(c.potential().clearance(c.x, {}), kGap);
+  EXPECT_EQ(c.potential().clearance(c.x, {}), kContactGap);
   c.surface.solids.push_back({Plane{}, -1.0, {}});
   c.solids.push_back({Vector(0, 0, 0.1), Eigen::Quaterniond::Identity()});
-  EXPECT_EQ(c.potential().clearance(c.x, c.solids), kGap);
+  EXPECT_EQ(c.potential().clearance(c.x, c.solids), kContactGap);
   EXPECT_EQ(c.potential().evaluate(c.x, c.solids, false), 0.0);
   c.surface.solids[0] = {Box{{1, 1, 1}}, -1.0, {}};
   c.surface.solids[0].body = true;
@@ -399,11 +384,11 @@ TEST(ContactSheets, WhatIsDrivenPassesThroughWhatIsDriven)
 
 TEST(ContactSheets, BadTrianglesAreRefused)
 {
-  Case good;
+  SheetCase good;
   good.addTriangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0});
   EXPECT_NO_THROW(good.potential());
   const auto refused = [&](const std::function<void(ContactSurface&)>& change) {
-    Case bad = good;
+    SheetCase bad = good;
     change(bad.surface);
     EXPECT_THROW(bad.potential(), std::invalid_argument);
   };
@@ -423,7 +408,7 @@ TEST(ContactSheets, FrictionSticksAndSlips)
   constexpr double kStep = 0.01, kFriction = 0.4;
   for (bool on_cloth : {false, true})
   {
-    Case c;
+    SheetCase c;
     if (on_cloth)
     {
       c = cells();
@@ -434,7 +419,7 @@ TEST(ContactSheets, FrictionSticksAndSlips)
       c.surface.solids.push_back({Plane{}, 0.1, {}});
       c.solids.resize(1);
     }
-    const Vector tip(0.1, -0.05, (on_cloth ? 1.0 : 0.5) * kThickness + 0.3 * kGap);
+    const Vector tip(0.1, -0.05, (on_cloth ? 1.0 : 0.5) * kSheetThickness + 0.3 * kContactGap);
     c.addTriangle(tip, tip + Vector(0.2, 0.1, 0.3), tip + Vector(-0.2, 0.15, 0.4), 1.6);   // geometric mean 0.4
     ContactPotential p = c.potential();
     p.begin(c.x, c.solids, kStep);

@@ -10,11 +10,11 @@ namespace {
 using Vector = Eigen::Vector3d;
 
 /// Pairs of segments `gap` apart: general, parallel, nearly parallel, and of very different lengths.
-struct Pair
+struct TwoSegments
 {
   Vector a0, a1, b0, b1;
 };
-Pair pairAt(Random& random, int kind, double thickness, double gap)
+TwoSegments pairAt(Random& random, int kind, double thickness, double gap)
 {
   const Vector e = random.direction(), n = e.cross(random.direction()).normalized(), side = n.cross(e);
   const double angle = kind == 0   ? random.uniform(-1.5, 1.5)
@@ -24,7 +24,7 @@ Pair pairAt(Random& random, int kind, double thickness, double gap)
   const double length = kind == 3 ? 0.01 : 1.0, tilt = kind == 2 ? random.uniform() * gap : 0.0;
   const Vector f = length * (std::cos(angle) * e + std::sin(angle) * side) + tilt * n;
   const Vector middle = random.uniform(-0.7, 0.7) * e + random.uniform(0.0, 0.3) * side;
-  Pair p{-0.5 * e, 0.5 * e, middle - 0.5 * f, middle + 0.5 * f};
+  TwoSegments p{-0.5 * e, 0.5 * e, middle - 0.5 * f, middle + 0.5 * f};
   // along n to the right distance, which rises with the height
   double low = 0.0, high = 2.0 * thickness + 2.0 * gap;
   for (int i = 0; i < 80; ++i)
@@ -44,7 +44,7 @@ TEST(SoftGap, IsTheOnlyMinimum)
     for (double gap : {1e-9, 1e-6, 1e-3, 0.05})
       for (int k = 0; k < 1000; ++k)
       {
-        const Pair p = pairAt(random, k % 4, thickness, gap);
+        const TwoSegments p = pairAt(random, k % 4, thickness, gap);
         const SoftGap soft = softGap(p.a0, p.a1, p.b0, p.b1, thickness);
         const double sharp = segmentDistance(p.a0, p.a1, p.b0, p.b1) - thickness;
         const double noise = 1e-15;

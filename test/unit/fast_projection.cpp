@@ -8,7 +8,7 @@
 namespace slender::test {
 namespace {
 
-struct Case
+struct ProjectionCase
 {
   FastProjection projection;
   std::vector<Matrix3Xd> start, trial, v;
@@ -112,7 +112,7 @@ TEST(FastProjection, RestoresLengthsOfOpenAndClosedChainsAndKeepsMomenta)
   for (bool closed : {false, true})
     for (int n : {closed ? 3 : 2, 4, 5, 8, 9, 17, 100})
     {
-      Case c;
+      ProjectionCase c;
       c.add(wigglyNodes(n, closed, random), closed, random);
       const auto before = c.momentum(0);
       const ProjectionReport report = c.run();
@@ -131,7 +131,7 @@ TEST(FastProjection, HeldNodesStayAndForcesBalance)
   Random random(4);
   for (bool closed : {false, true})
   {
-    Case c;
+    ProjectionCase c;
     const Matrix3Xd x = wigglyNodes(20, closed, random);
     c.add(x, closed, random);
     c.hold(0, 0, x.col(0) + Vector3d(0.01, 0, 0));
@@ -163,7 +163,7 @@ TEST(FastProjection, BodiesAtOneEndAtBothEndsAndAtTheMiddleOfThreeRods)
   Random random(5);
   for (int kind = 0; kind < 5; ++kind)
   {
-    Case c;
+    ProjectionCase c;
     int bodies = 1;
     const Matrix3Xd x = wigglyNodes(12, false, random);
     c.add(x, false, random);
@@ -227,7 +227,7 @@ TEST(FastProjection, ABodyAtAGripperSwingsAboutIt)
 {
   // one edge between a held node and a body: only the body can give
   Random random(6);
-  Case c;
+  ProjectionCase c;
   const Matrix3Xd x = straightNodes(3, 2.0);
   c.add(x, false, random);
   c.hold(0, 0, x.col(0));
@@ -248,7 +248,7 @@ TEST(FastProjection, StraightChainsThatOnlyBodiesCanRelieve)
     for (int kind = 0; kind < 4; ++kind)
     {
       Random random(10 + n);
-      Case c;
+      ProjectionCase c;
       const bool closed = kind == 3;
       Matrix3Xd x = straightNodes(n, 0.1 * n);
       if (closed)   // back again by way of a corner at the side
@@ -296,7 +296,7 @@ TEST(FastProjection, ConvergesQuadratically)
   for (int iterations : {1, 2, 3})
   {
     Random same(7);
-    Case c;
+    ProjectionCase c;
     c.add(wigglyNodes(40, false, same), false, same);
     c.projection.max_iterations = iterations;
     c.projection.tolerance = 1e-15;
@@ -313,7 +313,7 @@ TEST(FastProjection, NamesGripsThatAreTooFarApart)
   for (bool closed : {false, true})
   {
     Random random(8);
-    Case c;
+    ProjectionCase c;
     const Matrix3Xd x = wigglyNodes(20, closed, random);
     c.add(x, closed, random);
     c.hold(0, 2, x.col(2));
@@ -325,7 +325,7 @@ TEST(FastProjection, NamesGripsThatAreTooFarApart)
     EXPECT_EQ(report.last_node, 9);
   }
   Random random(9);
-  Case c;
+  ProjectionCase c;
   c.add(wigglyNodes(20, false, random), false, random);
   c.trial[0](1, 4) = std::nan("");
   c.projection.setStart(0, c.start[0]);

@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-const char* const kRod = R"(
+const char* const kCable = R"(
 rods:
   - name: cable
     centerline: {straight: {from: [-0.02, 0, 0], to: [0.02, 0, 0], edges: 20}}
@@ -24,7 +24,7 @@ rods:
     contact: {friction: 0.3}
 )";
 
-const char* const kThread = R"(
+const char* const kSyrup = R"(
 time: {step: 0.001, duration: 1}
 gravity: [0, 0, 0]
 contact: {gap: 5.0e-5}
@@ -36,7 +36,7 @@ threads:
     contact: {friction: 0.3}
 )";
 
-const char* const kBall = R"(
+const char* const kFallingBall = R"(
 bodies:
   - name: ball
     shape: {sphere: {radius: 0.004}}
@@ -46,10 +46,10 @@ bodies:
     friction: 0.3
 )";
 
-const std::string kCrossing = std::string(kThread) + kRod + kBall;
+const std::string kCrossing = std::string(kSyrup) + kCable + kFallingBall;
 
 /// Smallest distance between the surfaces of the rod, the thread and the ball [m].
-double room(const Simulation& s)
+double roomBetweenAll(const Simulation& s)
 {
   const RodState& rod = s.state().rods[0];
   const ThreadState& thread = s.state().threads[0].threads[0];
@@ -65,7 +65,7 @@ double room(const Simulation& s)
   return least;
 }
 
-Vector3d momentum(const Simulation& s)
+Vector3d momentumOfAll(const Simulation& s)
 {
   const RodState& rod = s.state().rods[0];
   Vector3d sum = 0.0002 * s.state().bodies[0].velocity.linear;
@@ -81,26 +81,26 @@ Vector3d momentum(const Simulation& s)
 TEST(IslandScheduler, ContactBetweenKindsKeepsMomentumAndDistance)
 {
   Simulation s(parseScene(kCrossing, "crossing"));
-  const Vector3d before = momentum(s);
+  const Vector3d before = momentumOfAll(s);
   std::size_t most = 0;
   for (int k = 0; k < 60; ++k)
   {
     const StepReport report = s.step(s.defaultInputs());
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     most = std::max(most, s.world().contacts().size());
-    ASSERT_GT(room(s), 0.0) << k;
+    ASSERT_GT(roomBetweenAll(s), 0.0) << k;
   }
   EXPECT_GE(most, 2u);
   EXPECT_LT(s.state().rods[0].v.row(2).mean(), -0.01);   // the ball pushes the rod through the thread
   // Newton's tolerance leaves forces of 1e-6 of the largest one unbalanced
-  EXPECT_LT((momentum(s) - before).norm(), 1e-5 * before.norm());
+  EXPECT_LT((momentumOfAll(s) - before).norm(), 1e-5 * before.norm());
 }
 
 TEST(IslandScheduler, WhatIsFarApartMovesAsOnItsOwn)
 {
   std::vector<std::string> apart = {"threads.0.centerline.straight={from: [1, -0.02, 0], to: [1, 0.02, 0], edges: 20}",
                                     "gravity=[0, 0, -9.81]"};
-  Simulation alone(parseScene(kThread, "alone", apart));
+  Simulation alone(parseScene(kSyrup, "alone", apart));
   apart.emplace_back("bodies.0.pose.position=[0, 1, 0]");
   Simulation together(parseScene(kCrossing, "together", apart));
   for (int k = 0; k < 50; ++k)
@@ -118,9 +118,9 @@ TEST(IslandScheduler, WhatIsFarApartMovesAsOnItsOwn)
 /// touches.
 TEST(IslandScheduler, ThreadsLeaveTheIntegratorToWhatTheyCannotMeet)
 {
-  std::string rod = kRod;
+  std::string rod = kCable;
   rod.erase(rod.find("    contact: {friction: 0.3}\n"));
-  const std::string hanging = std::string(kThread) + rod +
+  const std::string hanging = std::string(kSyrup) + rod +
                               "bodies: [{name: bob, mass: 0.001, inertia: [1.0e-8, 1.0e-8, 1.0e-8], "
                               "pose: {position: [0.02, 0, 0]}, welds: [{rod: cable, edge: -1}]}]\n";
   EXPECT_EQ(parseScene(hanging).time.integrator, Integrator::tr_bdf2);
@@ -136,7 +136,7 @@ TEST(IslandScheduler, ThreadsLeaveTheIntegratorToWhatTheyCannotMeet)
 /// The ball stands still 2 mm above the rod. Its force moves it by 11 mm in one step, which its velocity does not tell.
 TEST(IslandScheduler, IslandsThatMeetUnexpectedlyMakeTheirStepAgain)
 {
-  Simulation s(parseScene(std::string(kRod) + kBall, "falling",
+  Simulation s(parseScene(std::string(kCable) + kFallingBall, "falling",
                           {"bodies.0.pose.position=[0.001, 0, 0.007]", "bodies.0.velocity.linear=[0, 0, 0]",
                            "bodies.0.force=[0, 0, -0.002]", "gravity=[0, 0, 0]", "time={step: 0.0333, duration: 1}",
                            "contact={gap: 5.0e-5}"}));

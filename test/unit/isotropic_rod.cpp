@@ -9,7 +9,7 @@
 namespace slender::test {
 namespace {
 
-struct Case
+struct IsotropicCase
 {
   const char* name;
   bool closed;
@@ -18,14 +18,14 @@ struct Case
   double twist;   ///< imposed on every held span by turning its sections [rad]
 };
 
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const IsotropicCase& c, std::ostream* out) { *out << c.name; }
 
-class Isotropic : public ::testing::TestWithParam<Case>
+class Isotropic : public ::testing::TestWithParam<IsotropicCase>
 {
 protected:
   Isotropic() : random_(7)
   {
-    const Case& c = GetParam();
+    const IsotropicCase& c = GetParam();
     nodes_ = wigglyNodes(c.nodes, c.closed, random_);
     std::vector<RodSection> sections;
     for (int j = 0; j < (c.closed ? c.nodes : c.nodes - 1); ++j)
@@ -154,7 +154,7 @@ TEST_P(Isotropic, AgreesWithTheGeneralFormulation)
   EXPECT_NEAR(isotropic.stretch, general.stretch, 1e-12);
 }
 
-const Case kCases[] = {
+const IsotropicCase kIsotropicCases[] = {
     {"free", false, 12, {}, 0.0},
     {"one_end", false, 40, {{0, 0}}, 0.0},
     {"other_end", false, 40, {{38, 39}}, 0.0},
@@ -165,7 +165,7 @@ const Case kCases[] = {
     {"ring_held_once", true, 33, {{5, 6}}, 3.0},
     {"ring_held_twice", true, 20, {{0, 0}, {9, 11}}, 5.0},
 };
-INSTANTIATE_TEST_SUITE_P(Rods, Isotropic, ::testing::ValuesIn(kCases),
+INSTANTIATE_TEST_SUITE_P(Rods, Isotropic, ::testing::ValuesIn(kIsotropicCases),
                          [](const auto& info) { return std::string(info.param.name); });
 
 /// A wiggly rod pinned at its first node, with and without material frames, in explicit steps.

@@ -18,7 +18,7 @@ Simulation sceneOf(const std::string& rod, const std::string& more = "")
                  ", material: {linear_density: 1, stretch_modulus: 1e5, bend_modulus: 2, twist_modulus: 3}}\n"));
 }
 
-std::string problemOf(const std::string& rod)
+std::string problemOfRod(const std::string& rod)
 {
   try
   {
@@ -159,16 +159,17 @@ TEST(NaturalFrames, TheNaturalCurvatureOfARingTurnsWithItsFrames)
 TEST(NaturalFrames, WrongEntriesAreRefused)
 {
   const std::string straight = "centerline: {straight: {edges: 10}}";
-  EXPECT_NE(problemOf(straight + ", rest_twist: [1, 2]")
+  EXPECT_NE(problemOfRod(straight + ", rest_twist: [1, 2]")
                 .find("rods.0.rest_twist = [1, 2]: has 2 entries; must have 1 or 9 (one per inner node)"),
             std::string::npos);
-  EXPECT_NE(problemOf(straight + ", natural_curvature: 3").find("natural_curvature"), std::string::npos);
-  EXPECT_NE(problemOf(straight + ", natural_curvature: [1, 2, 3]").find("must be [kappa1, kappa2]"), std::string::npos);
-  EXPECT_NE(problemOf(straight + ", natural_curvature: [[1, 2], [1, 2]]").find("has 2 entries; must have 1 or 9"),
+  EXPECT_NE(problemOfRod(straight + ", natural_curvature: 3").find("natural_curvature"), std::string::npos);
+  EXPECT_NE(problemOfRod(straight + ", natural_curvature: [1, 2, 3]").find("must be [kappa1, kappa2]"),
             std::string::npos);
-  EXPECT_NE(problemOf(straight + ", natural_curvature: [30, 0]").find("must be less than 2: use shorter edges"),
+  EXPECT_NE(problemOfRod(straight + ", natural_curvature: [[1, 2], [1, 2]]").find("has 2 entries; must have 1 or 9"),
             std::string::npos);
-  EXPECT_NE(problemOf(straight + ", natural_curvature: [1, 0], naturally_straight: true")
+  EXPECT_NE(problemOfRod(straight + ", natural_curvature: [30, 0]").find("must be less than 2: use shorter edges"),
+            std::string::npos);
+  EXPECT_NE(problemOfRod(straight + ", natural_curvature: [1, 0], naturally_straight: true")
                 .find("contradicts naturally_straight"),
             std::string::npos);
   const std::string ring =

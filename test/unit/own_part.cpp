@@ -121,8 +121,6 @@ private:
   Eigen::Matrix3d hessian_;
 };
 
-constexpr double kStep = 0.005, kGap = 1e-3;
-
 StepReport step(ClothIsland& island)
 {
   const StepReport report = island.step();
@@ -134,14 +132,15 @@ StepReport step(ClothIsland& island)
 TEST(OwnPart, SwingsOnItsOwn)
 {
   SpringBall ball({0, 0, 0});
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   island.others = {&ball};
   double x = 0.0, v = 0.0;
   for (int k = 0; k < 200; ++k)
   {
     step(island);
-    v = (v - kStep * (9.81 + ball.stiffness / ball.mass * x)) / (1.0 + kStep * kStep * ball.stiffness / ball.mass);
-    x += kStep * v;
+    v = (v - kIslandStep * (9.81 + ball.stiffness / ball.mass * x)) /
+        (1.0 + kIslandStep * kIslandStep * ball.stiffness / ball.mass);
+    x += kIslandStep * v;
     EXPECT_NEAR(ball.x.z(), x, 1e-12);   // round-off of a tenth of a metre
   }
 }
@@ -153,7 +152,7 @@ TEST(OwnPart, SharesAnIslandWithARodAndACloth)
   ball.stiffness = 0.0;
   ball.gravity.setZero();
   ball.v = {0, 0, -2};
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   island.gravity.setZero();
   island.others = {&ball};
   const Matrix3Xd nodes = straightNodes(8, 0.2, {-0.1, 0, 0});
@@ -185,7 +184,7 @@ TEST(OwnPart, FallsOnARope)
 {
   SpringBall ball({0.2, 0, 0.06});
   ball.stiffness = 0.1;   // bears 2 % of the weight
-  ClothIsland island(kStep, kGap);
+  ClothIsland island(kIslandStep, kIslandGap);
   island.others = {&ball};
   const Matrix3Xd nodes = straightNodes(21, 0.4, {0, 0, 0});
   auto rod = std::make_shared<RodModel>(openRod(nodes, roundSection(4e-3, 1e6, 1000.0)));
@@ -199,7 +198,7 @@ TEST(OwnPart, FallsOnARope)
   for (int k = 0; k < 400; ++k)
     step(island);
   const Vector3d middle = island.rods[0].state.x.col(10);
-  EXPECT_NEAR(ball.x.z() - middle.z(), ball.radius + 4e-3, kGap + 1e-4);   // within the barrier's range
+  EXPECT_NEAR(ball.x.z() - middle.z(), ball.radius + 4e-3, kIslandGap + 1e-4);   // within the barrier's range
   EXPECT_LT(ball.v.norm(), 0.01);
 }
 

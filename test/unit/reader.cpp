@@ -5,9 +5,13 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/scene/shapes.h"
+#include "test/support/scenes.h"
 
 namespace slender {
 namespace {
+
+using test::BadOverride;
+using test::problemsOf;
 
 const char* const good_scene = R"(# line 1
 name: test
@@ -26,19 +30,6 @@ rods:
       left: {edges: [0], motion: fixed}
       middle: {nodes: [5], hold: position, motion: {table: [[0, 0.5, 0, 1], [1, 0.5, 0, 2]]}}
 )";
-
-std::string problemsOf(const std::string& text, const std::vector<std::string>& overrides = {})
-{
-  try
-  {
-    parseScene(text, "test.yaml", overrides);
-  }
-  catch (const SceneError& error)
-  {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(Reader, readsAScene)
 {
@@ -77,15 +68,7 @@ TEST(Reader, aTinySceneHasDefaults)
   EXPECT_EQ(rodSections(scene.rods[0], 50).size(), 50u);
 }
 
-struct Case
-{
-  const char* override_text;
-  const char* expected;
-};
-
-void PrintTo(const Case& c, std::ostream* out) { *out << c.override_text; }
-
-class BadValue : public testing::TestWithParam<Case>
+class BadValue : public testing::TestWithParam<BadOverride>
 {};
 
 /// Each bad value on its own is refused, and the message holds the path, the value, and what would be allowed.
@@ -101,162 +84,174 @@ TEST_P(BadValue, isRefusedWithPathAndRange)
 
 INSTANTIATE_TEST_SUITE_P(
     Time, BadValue,
-    testing::Values(Case{"time.step=0", "time.step = 0: is out of range; must be a number in (0, 10] s"},
-                    Case{"time.step=-1", "in (0, 10] s"}, Case{"time.step=10.5", "in (0, 10] s"},
-                    Case{"time.step=.nan", "is not finite"}, Case{"time.step=.inf", "is not finite"},
-                    Case{"time.step=1e999", "is not finite"},
-                    Case{"time.step=fast", "time.step = fast: is not a number"},
-                    Case{"time.step=0x10", "is not a number"}, Case{"time.step=[1]", "is a list; must be a number"},
-                    Case{"time.step=", "is nothing; must be a number"}, Case{"time.step=5 ms", "is not a number"},
-                    Case{"time.duration=0", "in (0, 10000000] s"}, Case{"time.duration=1e8", "in (0, 10000000] s"},
-                    Case{"time.integrator=euler", "must be one of: implicit_euler, bdf2"},
-                    Case{"time.integrator=bdf3", "did you mean bdf2?"}, Case{"time.spectral_radius=1.1", "in [0, 1]"},
-                    Case{"time.spectral_radius=-0.1", "in [0, 1]"}, Case{"time.error_tolerance=-1", "in [0, 1] m"},
-                    Case{"time.min_step=0", "in (0, 10] s"},
-                    Case{"time.min_step=0.006", "is longer than time.step; must be in (0, 0.005] s"},
-                    Case{"time.newton.tolerance=0.1", "in (1e-14, 0.1)"},
-                    Case{"time.newton.tolerance=1e-14", "in (1e-14, 0.1)"},
-                    Case{"time.newton.max_iterations=0", "in [1, 1000]"},
-                    Case{"time.newton.max_iterations=2.5", "must be a whole number"},
-                    Case{"time.newton.max_cuts=31", "in [0, 30]"}, Case{"time.newton.max_cuts=-1", "in [0, 30]"},
-                    Case{"time.newton.iterations=3", "unknown key (did you mean max_iterations?)"},
-                    Case{"time.dt=0.1", "unknown key; known here: step, duration"}, Case{"time=3", "must be a map"}));
+    testing::Values(
+        BadOverride{"time.step=0", "time.step = 0: is out of range; must be a number in (0, 10] s"},
+        BadOverride{"time.step=-1", "in (0, 10] s"}, BadOverride{"time.step=10.5", "in (0, 10] s"},
+        BadOverride{"time.step=.nan", "is not finite"}, BadOverride{"time.step=.inf", "is not finite"},
+        BadOverride{"time.step=1e999", "is not finite"},
+        BadOverride{"time.step=fast", "time.step = fast: is not a number"},
+        BadOverride{"time.step=0x10", "is not a number"}, BadOverride{"time.step=[1]", "is a list; must be a number"},
+        BadOverride{"time.step=", "is nothing; must be a number"}, BadOverride{"time.step=5 ms", "is not a number"},
+        BadOverride{"time.duration=0", "in (0, 10000000] s"}, BadOverride{"time.duration=1e8", "in (0, 10000000] s"},
+        BadOverride{"time.integrator=euler", "must be one of: implicit_euler, bdf2"},
+        BadOverride{"time.integrator=bdf3", "did you mean bdf2?"}, BadOverride{"time.spectral_radius=1.1", "in [0, 1]"},
+        BadOverride{"time.spectral_radius=-0.1", "in [0, 1]"}, BadOverride{"time.error_tolerance=-1", "in [0, 1] m"},
+        BadOverride{"time.min_step=0", "in (0, 10] s"},
+        BadOverride{"time.min_step=0.006", "is longer than time.step; must be in (0, 0.005] s"},
+        BadOverride{"time.newton.tolerance=0.1", "in (1e-14, 0.1)"},
+        BadOverride{"time.newton.tolerance=1e-14", "in (1e-14, 0.1)"},
+        BadOverride{"time.newton.max_iterations=0", "in [1, 1000]"},
+        BadOverride{"time.newton.max_iterations=2.5", "must be a whole number"},
+        BadOverride{"time.newton.max_cuts=31", "in [0, 30]"}, BadOverride{"time.newton.max_cuts=-1", "in [0, 30]"},
+        BadOverride{"time.newton.iterations=3", "unknown key (did you mean max_iterations?)"},
+        BadOverride{"time.dt=0.1", "unknown key; known here: step, duration"}, BadOverride{"time=3", "must be a map"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Scene, BadValue,
-    testing::Values(Case{"gravity=-9.81", "must be a list [x, y, z]"}, Case{"gravity=[0, -9.81]", "has 2 entries"},
-                    Case{"gravity.2=1e10",
-                         "gravity.2 = 1e10: is out of range; must be a number in [-1000000000, 1000000000] m/s^2"},
-                    Case{"wind.velocity.0=2000", "in [-1000, 1000] m/s"}, Case{"wind.speed=3", "unknown key"},
-                    Case{"wind=[1, 0, 0]", "wind = [1, 0, 0]: is a list; must be a map"},
-                    Case{"start=now", "must be one of: as_given, equilibrium"},
-                    Case{"record.every=0", "in [1, 1000000000] steps"},
-                    Case{"contact.self=true", "unknown key; known here: gap, slip_speed"},
-                    Case{"contact.gap=0.001", "no rod, thread, or cloth with method: barrier takes part"},
-                    Case{"threads=[]", "threads = []: has 0 entries; must have 1 to 10000"},
-                    Case{"cloths=[]", "cloths = []: has 0 entries; must have 1 to 1000"},
-                    Case{"tracked=[]", "tracked = []: has 0 entries; must have 1 to 1000"},
-                    Case{"rod=[]", "unknown key (did you mean rods?)"}, Case{"name=", "must be a text"},
-                    Case{"rods=[]", "has 0 entries; must have 1 to 100000"}, Case{"rods={}", "must be a list"}));
+    testing::Values(
+        BadOverride{"gravity=-9.81", "must be a list [x, y, z]"}, BadOverride{"gravity=[0, -9.81]", "has 2 entries"},
+        BadOverride{"gravity.2=1e10",
+                    "gravity.2 = 1e10: is out of range; must be a number in [-1000000000, 1000000000] m/s^2"},
+        BadOverride{"wind.velocity.0=2000", "in [-1000, 1000] m/s"}, BadOverride{"wind.speed=3", "unknown key"},
+        BadOverride{"wind=[1, 0, 0]", "wind = [1, 0, 0]: is a list; must be a map"},
+        BadOverride{"start=now", "must be one of: as_given, equilibrium"},
+        BadOverride{"record.every=0", "in [1, 1000000000] steps"},
+        BadOverride{"contact.self=true", "unknown key; known here: gap, slip_speed"},
+        BadOverride{"contact.gap=0.001", "no rod, thread, or cloth with method: barrier takes part"},
+        BadOverride{"threads=[]", "threads = []: has 0 entries; must have 1 to 10000"},
+        BadOverride{"cloths=[]", "cloths = []: has 0 entries; must have 1 to 1000"},
+        BadOverride{"tracked=[]", "tracked = []: has 0 entries; must have 1 to 1000"},
+        BadOverride{"rod=[]", "unknown key (did you mean rods?)"}, BadOverride{"name=", "must be a text"},
+        BadOverride{"rods=[]", "has 0 entries; must have 1 to 100000"}, BadOverride{"rods={}", "must be a list"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Curve, BadValue,
     testing::Values(
-        Case{"rods.0.centerline.straight.edges=1000001", "in [1, 1000000]"},
-        Case{"rods.0.centerline.straight.edges=0", "in [1, 1000000]"},
-        Case{"rods.0.centerline.straight.edges=1", "makes 1 edges; a rod needs at least 2"},
-        Case{"rods.0.centerline.straight.to=[0, 0, 1]", "from and to are the same point"},
-        Case{"rods.0.centerline.straight.to.1=1e7", "in [-1000000, 1000000] m"},
-        Case{"rods.0.centerline={}", "names 0 curves; must name one of: straight, polyline"},
-        Case{"rods.0.centerline={straight: {}, arc: {}}", "names 2 curves"},
-        Case{"rods.0.centerline={strait: {}}", "did you mean straight?"},
-        Case{"rods.0.centerline={polyline: {points: [[0, 0, 0]]}}", "has 1 entries"},
-        Case{"rods.0.centerline={polyline: {edges: 10}}", "points: is missing"},
-        Case{"rods.0.centerline={polyline: {points: [[0, 0, 0], [1, 0, 0], [1, 0, 0]]}}",
-             "nodes 1 and 2 are at the same place"},
-        Case{"rods.0.centerline={polyline: {points: [[0, 0, 0], [1, 0]]}}", "points.1 = [1, 0]: has 2 entries"},
-        Case{"rods.0.centerline={arc: {angle: 0}}", "must not be zero"},
-        Case{"rods.0.centerline={arc: {angle: 1.0e6}}", "rad"},
-        Case{"rods.0.centerline={arc: {axis: [0, 0, 0]}}", "axis = 0 0 0: must be a vector of non-zero"},
-        Case{"rods.0.centerline={arc: {start: [0, 0, 1]}}", "off the axis"},
-        Case{"rods.0.centerline={helix: {radius: 0}}", "in (0, 1000000] m"},
-        Case{"rods.0.centerline={helix: {turns: 0}}", "must not be zero"},
-        Case{"rods.0.centerline={catenary: {length: 0.5}}", "length = 0.5: must be at least the distance of the ends"},
-        Case{"rods.0.centerline={catenary: {to: [0, 0, 0.5]}}", "not above or below"},
-        Case{"rods.0.centerline={trefoil: {length: 0.5}}", "length = 0.5: must be at least"},
-        Case{"rods.0.centerline={trefoil: {separation: 0.1}}", "a quarter of the radius"},
-        Case{"rods.0.centerline={trefoil: {up: [1, 0, 0]}}", "must be a vector not along axis"},
-        Case{"rods.0.centerline={torus_knot: {around: 3}}", "without a common divisor with around = 3"},
-        Case{"rods.0.centerline={torus_knot: {tube_radius: 0.1}}", "tube_radius = 0.1: must be in (0, 0.1 m)"},
-        Case{"rods.0.centerline={vee: {edges: 11}}", "edges = 11: must be even"},
-        Case{"rods.0.centerline={vee: {angle: 4}}", "in (0, 3.141592654) rad"},
-        Case{"rods.0.centerline={file: {path: nowhere.csv}}", "nowhere.csv: cannot be opened"},
-        Case{"rods.0.centerline={file: {edges: 3}}", "path: is missing"},
-        Case{"rods.0.initial={catenary: {length: 0.5}}", "rods.0.initial: length = 0.5: must be at least"},
-        Case{"rods.0.director=[1, 0, 0]", "is along the first edge"},
-        Case{"rods.0.initial_twist=1e6", "in [-100000, 100000] rad"},
-        Case{"rods.0.closed=maybe", "must be true or false"}, Case{"rods.0.name=left rope", "is not a name"},
-        Case{"rods.0.name=1rope", "is not a name"}, Case{"rods.0.colour=red", "unknown key; known here: name"},
-        Case{"rods.0.material.youngs_moduls=1e6", "did you mean youngs_modulus?"}));
+        BadOverride{"rods.0.centerline.straight.edges=1000001", "in [1, 1000000]"},
+        BadOverride{"rods.0.centerline.straight.edges=0", "in [1, 1000000]"},
+        BadOverride{"rods.0.centerline.straight.edges=1", "makes 1 edges; a rod needs at least 2"},
+        BadOverride{"rods.0.centerline.straight.to=[0, 0, 1]", "from and to are the same point"},
+        BadOverride{"rods.0.centerline.straight.to.1=1e7", "in [-1000000, 1000000] m"},
+        BadOverride{"rods.0.centerline={}", "names 0 curves; must name one of: straight, polyline"},
+        BadOverride{"rods.0.centerline={straight: {}, arc: {}}", "names 2 curves"},
+        BadOverride{"rods.0.centerline={strait: {}}", "did you mean straight?"},
+        BadOverride{"rods.0.centerline={polyline: {points: [[0, 0, 0]]}}", "has 1 entries"},
+        BadOverride{"rods.0.centerline={polyline: {edges: 10}}", "points: is missing"},
+        BadOverride{"rods.0.centerline={polyline: {points: [[0, 0, 0], [1, 0, 0], [1, 0, 0]]}}",
+                    "nodes 1 and 2 are at the same place"},
+        BadOverride{"rods.0.centerline={polyline: {points: [[0, 0, 0], [1, 0]]}}", "points.1 = [1, 0]: has 2 entries"},
+        BadOverride{"rods.0.centerline={arc: {angle: 0}}", "must not be zero"},
+        BadOverride{"rods.0.centerline={arc: {angle: 1.0e6}}", "rad"},
+        BadOverride{"rods.0.centerline={arc: {axis: [0, 0, 0]}}", "axis = 0 0 0: must be a vector of non-zero"},
+        BadOverride{"rods.0.centerline={arc: {start: [0, 0, 1]}}", "off the axis"},
+        BadOverride{"rods.0.centerline={helix: {radius: 0}}", "in (0, 1000000] m"},
+        BadOverride{"rods.0.centerline={helix: {turns: 0}}", "must not be zero"},
+        BadOverride{"rods.0.centerline={catenary: {length: 0.5}}",
+                    "length = 0.5: must be at least the distance of the ends"},
+        BadOverride{"rods.0.centerline={catenary: {to: [0, 0, 0.5]}}", "not above or below"},
+        BadOverride{"rods.0.centerline={trefoil: {length: 0.5}}", "length = 0.5: must be at least"},
+        BadOverride{"rods.0.centerline={trefoil: {separation: 0.1}}", "a quarter of the radius"},
+        BadOverride{"rods.0.centerline={trefoil: {up: [1, 0, 0]}}", "must be a vector not along axis"},
+        BadOverride{"rods.0.centerline={torus_knot: {around: 3}}", "without a common divisor with around = 3"},
+        BadOverride{"rods.0.centerline={torus_knot: {tube_radius: 0.1}}", "tube_radius = 0.1: must be in (0, 0.1 m)"},
+        BadOverride{"rods.0.centerline={vee: {edges: 11}}", "edges = 11: must be even"},
+        BadOverride{"rods.0.centerline={vee: {angle: 4}}", "in (0, 3.141592654) rad"},
+        BadOverride{"rods.0.centerline={file: {path: nowhere.csv}}", "nowhere.csv: cannot be opened"},
+        BadOverride{"rods.0.centerline={file: {edges: 3}}", "path: is missing"},
+        BadOverride{"rods.0.initial={catenary: {length: 0.5}}", "rods.0.initial: length = 0.5: must be at least"},
+        BadOverride{"rods.0.director=[1, 0, 0]", "is along the first edge"},
+        BadOverride{"rods.0.initial_twist=1e6", "in [-100000, 100000] rad"},
+        BadOverride{"rods.0.closed=maybe", "must be true or false"},
+        BadOverride{"rods.0.name=left rope", "is not a name"}, BadOverride{"rods.0.name=1rope", "is not a name"},
+        BadOverride{"rods.0.colour=red", "unknown key; known here: name"},
+        BadOverride{"rods.0.material.youngs_moduls=1e6", "did you mean youngs_modulus?"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Material, BadValue,
     testing::Values(
-        Case{"rods.0.cross_section.radius=0", "in (0, 10] m"},
-        Case{"rods.0.cross_section.radius=-0.1",
-             "rods.0.cross_section.radius = -0.1: is out of range; must be a number in (0, 10] m"},
-        Case{"rods.0.cross_section.radius=[1, 2, 3]", "has 3 entries; must have 1, 2 (a taper) or one per edge (10)"},
-        Case{"rods.0.cross_section.radius=[0.1, 0]", "radius.1 = 0"},
-        Case{"rods.0.cross_section.radius=[]", "has 0 entries"},
-        Case{"rods.0.cross_section={}", "must have either radius or ellipse"},
-        Case{"rods.0.cross_section.ellipse=[0.1, 0.2]", "must have either radius or ellipse"},
-        Case{"rods.0.cross_section={ellipse: [0.1]}", "has 1 entries; must have 2"},
-        Case{"rods.0.cross_section={ellipse: [0.1, [1, 2, 3]]}", "ellipse.1 = [1, 2, 3]: has 3 entries"},
-        Case{"rods.0.material.density=0", "in (0, 1000000] kg/m^3"},
-        Case{"rods.0.material.youngs_modulus=0", "in (0, 1e+15] Pa"},
-        Case{"rods.0.material.poissons_ratio=0.51", "in (-1, 0.5]"},
-        Case{"rods.0.material.poissons_ratio=-1", "in (-1, 0.5]"},
-        Case{"rods.0.material.torsion=round", "must be one of: polar, saint_venant"},
-        Case{"rods.0.material.linear_density=0", "kg/m"}, Case{"rods.0.material.stretch_modulus=-1", "in (0, 1e+15] N"},
-        Case{"rods.0.material.twist_modulus=0", "N m^2"}, Case{"rods.0.material.bend_modulus=0", "N m^2"},
-        Case{"rods.0.material.bend_modulus=[1, 0]", "bend_modulus.1 = 0"},
-        Case{"rods.0.material.bend_modulus=[1, 2, 3]", "has 3 entries; must have 2"},
-        Case{"rods.0.material.bend_modulus=[[1, 2], [2, 1]]", "positive definite"},
-        Case{"rods.0.material.bend_modulus=[[1, 0.1], [0, 1]]", "symmetric"},
-        Case{"rods.0.damping.mass=-1", "in [0, 1000000] 1/s"}, Case{"rods.0.damping.stiffness=-1", "in [0, 1000] s"},
-        Case{"rods.0.curvature=angle", "must be one of: auto, tangent, compensated"},
-        Case{"rods.0.matched_to_arcs=1", "matched_to_arcs = 1"},
-        Case{"rods.0={naturally_straight: true, matched_to_arcs: true}", "has no arcs to match its joints to"},
-        Case{"rods.0.damping.drag=-1", "N s/m^2"}));
+        BadOverride{"rods.0.cross_section.radius=0", "in (0, 10] m"},
+        BadOverride{"rods.0.cross_section.radius=-0.1",
+                    "rods.0.cross_section.radius = -0.1: is out of range; must be a number in (0, 10] m"},
+        BadOverride{"rods.0.cross_section.radius=[1, 2, 3]",
+                    "has 3 entries; must have 1, 2 (a taper) or one per edge (10)"},
+        BadOverride{"rods.0.cross_section.radius=[0.1, 0]", "radius.1 = 0"},
+        BadOverride{"rods.0.cross_section.radius=[]", "has 0 entries"},
+        BadOverride{"rods.0.cross_section={}", "must have either radius or ellipse"},
+        BadOverride{"rods.0.cross_section.ellipse=[0.1, 0.2]", "must have either radius or ellipse"},
+        BadOverride{"rods.0.cross_section={ellipse: [0.1]}", "has 1 entries; must have 2"},
+        BadOverride{"rods.0.cross_section={ellipse: [0.1, [1, 2, 3]]}", "ellipse.1 = [1, 2, 3]: has 3 entries"},
+        BadOverride{"rods.0.material.density=0", "in (0, 1000000] kg/m^3"},
+        BadOverride{"rods.0.material.youngs_modulus=0", "in (0, 1e+15] Pa"},
+        BadOverride{"rods.0.material.poissons_ratio=0.51", "in (-1, 0.5]"},
+        BadOverride{"rods.0.material.poissons_ratio=-1", "in (-1, 0.5]"},
+        BadOverride{"rods.0.material.torsion=round", "must be one of: polar, saint_venant"},
+        BadOverride{"rods.0.material.linear_density=0", "kg/m"},
+        BadOverride{"rods.0.material.stretch_modulus=-1", "in (0, 1e+15] N"},
+        BadOverride{"rods.0.material.twist_modulus=0", "N m^2"}, BadOverride{"rods.0.material.bend_modulus=0", "N m^2"},
+        BadOverride{"rods.0.material.bend_modulus=[1, 0]", "bend_modulus.1 = 0"},
+        BadOverride{"rods.0.material.bend_modulus=[1, 2, 3]", "has 3 entries; must have 2"},
+        BadOverride{"rods.0.material.bend_modulus=[[1, 2], [2, 1]]", "positive definite"},
+        BadOverride{"rods.0.material.bend_modulus=[[1, 0.1], [0, 1]]", "symmetric"},
+        BadOverride{"rods.0.damping.mass=-1", "in [0, 1000000] 1/s"},
+        BadOverride{"rods.0.damping.stiffness=-1", "in [0, 1000] s"},
+        BadOverride{"rods.0.curvature=angle", "must be one of: auto, tangent, compensated"},
+        BadOverride{"rods.0.matched_to_arcs=1", "matched_to_arcs = 1"},
+        BadOverride{"rods.0={naturally_straight: true, matched_to_arcs: true}", "has no arcs to match its joints to"},
+        BadOverride{"rods.0.damping.drag=-1", "N s/m^2"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Grasp, BadValue,
     testing::Values(
-        Case{"rods.0.grasps.left={}", "must have either edges or nodes"},
-        Case{"rods.0.grasps.left.nodes=[1]", "must have either edges or nodes"},
-        Case{"rods.0.grasps.left.edges=[10]", "in [-10, 9]"}, Case{"rods.0.grasps.left.edges=[-11]", "in [-10, 9]"},
-        Case{"rods.0.grasps.left.edges=[]", "has 0 entries"},
-        Case{"rods.0.grasps.left.edges=[0, 2]", "must be consecutive"},
-        Case{"rods.0.grasps.left.edges=[0, 0]", "must be consecutive"},
-        Case{"rods.0.grasps.left.edges=[3..1]", "must be FIRST..LAST"},
-        Case{"rods.0.grasps.left.edges=[0..x]", "must be FIRST..LAST"},
-        Case{"rods.0.grasps.left.edges=[0..5]", "overlap"},
-        Case{"rods.0.grasps.left.edges=[9]", "overlaps grasp right"},
-        Case{"rods.0.grasps.left={nodes: [11]}", "in [-11, 10]"}, Case{"rods.0.grasps.left={nodes: [5]}", "overlap"},
-        Case{"rods.0.grasps.left.hold=tight", "must be one of: frame, position"},
-        Case{"rods.0.grasps.middle={edges: [4, 5], hold: position}", "holds 3 nodes; a point pin holds one"},
-        Case{"rods.0.grasps.left.attach=glue", "must be one of: section, initial"},
-        Case{"rods.0.grasps.left.motion=moving", "must be one of: fixed, topic"},
-        Case{"rods.0.grasps.left.motion={}", "must be fixed or one of"},
-        Case{"rods.0.grasps.left.motion={topic: false}", "must be true"},
-        Case{"rods.0.grasps.left.motion={topic: true, body: b}", "must be fixed or one of"},
-        Case{"rods.0.grasps.left.motion={file: nowhere.csv, body: b}", "nowhere.csv: cannot be opened"},
-        Case{"rods.0.grasps.left.attach=gripper",
-             "must be one of: section, initial; attach: Which point the poses of `motion` describe"},
-        Case{"rods.0.grasps.left.motion={file: nowhere.csv}", "nowhere.csv: cannot be opened"},
-        Case{"rods.0.grasps.left.motion={body: b, file: [1]}", "must be"},
-        Case{"rods.0.grasps.left.motion={table: []}", "has 0 entries"},
-        Case{"rods.0.grasps.left.motion={table: [[0, 1, 2]]}", "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw]"},
-        Case{"rods.0.grasps.left.motion={table: [[0, 1, 2, 3]]}", "has 4 numbers"},
-        Case{"rods.0.grasps.left.motion={table: [[0, 0, 0, 0, 0, 0, 0, 2]]}",
-             "quaternion's length is 2; must be in [0.99, 1.01]"},
-        Case{"rods.0.grasps.left.motion={table: [[1, 0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 0, 1]]}",
-             "times must increase"},
-        Case{"rods.0.grasps.left.motion={table: [[0, 0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 1, 0]]}",
-             "turns by 180 degrees"},
-        Case{"rods.0.grasps.left.motion={table: [[.nan, 0, 0, 0, 0, 0, 0, 1]]}", "is not finite"},
-        Case{"rods.0.grasps.left.speed=1", "unknown key; known here: edges, nodes"}));
+        BadOverride{"rods.0.grasps.left={}", "must have either edges or nodes"},
+        BadOverride{"rods.0.grasps.left.nodes=[1]", "must have either edges or nodes"},
+        BadOverride{"rods.0.grasps.left.edges=[10]", "in [-10, 9]"},
+        BadOverride{"rods.0.grasps.left.edges=[-11]", "in [-10, 9]"},
+        BadOverride{"rods.0.grasps.left.edges=[]", "has 0 entries"},
+        BadOverride{"rods.0.grasps.left.edges=[0, 2]", "must be consecutive"},
+        BadOverride{"rods.0.grasps.left.edges=[0, 0]", "must be consecutive"},
+        BadOverride{"rods.0.grasps.left.edges=[3..1]", "must be FIRST..LAST"},
+        BadOverride{"rods.0.grasps.left.edges=[0..x]", "must be FIRST..LAST"},
+        BadOverride{"rods.0.grasps.left.edges=[0..5]", "overlap"},
+        BadOverride{"rods.0.grasps.left.edges=[9]", "overlaps grasp right"},
+        BadOverride{"rods.0.grasps.left={nodes: [11]}", "in [-11, 10]"},
+        BadOverride{"rods.0.grasps.left={nodes: [5]}", "overlap"},
+        BadOverride{"rods.0.grasps.left.hold=tight", "must be one of: frame, position"},
+        BadOverride{"rods.0.grasps.middle={edges: [4, 5], hold: position}", "holds 3 nodes; a point pin holds one"},
+        BadOverride{"rods.0.grasps.left.attach=glue", "must be one of: section, initial"},
+        BadOverride{"rods.0.grasps.left.motion=moving", "must be one of: fixed, topic"},
+        BadOverride{"rods.0.grasps.left.motion={}", "must be fixed or one of"},
+        BadOverride{"rods.0.grasps.left.motion={topic: false}", "must be true"},
+        BadOverride{"rods.0.grasps.left.motion={topic: true, body: b}", "must be fixed or one of"},
+        BadOverride{"rods.0.grasps.left.motion={file: nowhere.csv, body: b}", "nowhere.csv: cannot be opened"},
+        BadOverride{"rods.0.grasps.left.attach=gripper",
+                    "must be one of: section, initial; attach: Which point the poses of `motion` describe"},
+        BadOverride{"rods.0.grasps.left.motion={file: nowhere.csv}", "nowhere.csv: cannot be opened"},
+        BadOverride{"rods.0.grasps.left.motion={body: b, file: [1]}", "must be"},
+        BadOverride{"rods.0.grasps.left.motion={table: []}", "has 0 entries"},
+        BadOverride{"rods.0.grasps.left.motion={table: [[0, 1, 2]]}",
+                    "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw]"},
+        BadOverride{"rods.0.grasps.left.motion={table: [[0, 1, 2, 3]]}", "has 4 numbers"},
+        BadOverride{"rods.0.grasps.left.motion={table: [[0, 0, 0, 0, 0, 0, 0, 2]]}",
+                    "quaternion's length is 2; must be in [0.99, 1.01]"},
+        BadOverride{"rods.0.grasps.left.motion={table: [[1, 0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 0, 1]]}",
+                    "times must increase"},
+        BadOverride{"rods.0.grasps.left.motion={table: [[0, 0, 0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, 0, 1, 0]]}",
+                    "turns by 180 degrees"},
+        BadOverride{"rods.0.grasps.left.motion={table: [[.nan, 0, 0, 0, 0, 0, 0, 1]]}", "is not finite"},
+        BadOverride{"rods.0.grasps.left.speed=1", "unknown key; known here: edges, nodes"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Path, BadValue,
-    testing::Values(Case{"rods.1.name=x", "'rods' is a list; '1' must be a whole number in [-1, 0]"},
-                    Case{"rods.first.name=x", "'first' must be a whole number"},
-                    Case{"rods.rope.material.density=0", "material.density = 0: is out of range"},   // by its name
-                    Case{"rods.4e85.name=x", "'4e85' must be a whole number"},
-                    Case{"rods.-4e85.name=x", "'-4e85' must be a whole number"}, Case{"rods.0.5.name=x", "unknown key"},
-                    Case{"time.step.size=1", "'time.step' is the single value '0.005' and has no part 'size'"},
-                    Case{"time..step=1", "empty part"}, Case{"time.step", "must be PATH=VALUE"},
-                    Case{"=3", "must be PATH=VALUE"}, Case{"time.step=[1, 2", "not valid YAML"}));
+    testing::Values(BadOverride{"rods.1.name=x", "'rods' is a list; '1' must be a whole number in [-1, 0]"},
+                    BadOverride{"rods.first.name=x", "'first' must be a whole number"},
+                    BadOverride{"rods.rope.material.density=0",
+                                "material.density = 0: is out of range"},   // by its name
+                    BadOverride{"rods.4e85.name=x", "'4e85' must be a whole number"},
+                    BadOverride{"rods.-4e85.name=x", "'-4e85' must be a whole number"},
+                    BadOverride{"rods.0.5.name=x", "unknown key"},
+                    BadOverride{"time.step.size=1", "'time.step' is the single value '0.005' and has no part 'size'"},
+                    BadOverride{"time..step=1", "empty part"}, BadOverride{"time.step", "must be PATH=VALUE"},
+                    BadOverride{"=3", "must be PATH=VALUE"}, BadOverride{"time.step=[1, 2", "not valid YAML"}));
 
 TEST(Reader, namesFileAndLine)
 {

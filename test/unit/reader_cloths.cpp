@@ -7,11 +7,13 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
+#include "test/support/scenes.h"
 
 namespace slender {
 namespace {
 
 using Eigen::Vector3d;
+using test::problemsOf;
 
 const char* const towel = R"(
 name: towel
@@ -27,19 +29,6 @@ cloths:
       left: {corner: upper_left}
       right: {vertices: [8, "17..18", -1], motion: {topic: true}, attach: frame}
 )";
-
-std::string problemsOf(const std::vector<std::string>& overrides, const std::string& directory = ".")
-{
-  try
-  {
-    parseScene(towel, "t", overrides, directory);
-  }
-  catch (const SceneError& error)
-  {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(ClothReader, ReadsEverything)
 {
@@ -141,15 +130,15 @@ TEST(ClothReader, NamesWhatIsWrong)
   };
   for (const auto& [assignment, expected] : cases)
   {
-    EXPECT_NE(problemsOf({assignment}).find(expected), std::string::npos)
-        << assignment << "\ngave: " << problemsOf({assignment});
+    EXPECT_NE(problemsOf(towel, {assignment}).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemsOf(towel, {assignment});
   }
-  EXPECT_NE(problemsOf({"rods=[{grasps: {left: {edges: [0]}}}]"}).find("same name as a grasp of rod"),
+  EXPECT_NE(problemsOf(towel, {"rods=[{grasps: {left: {edges: [0]}}}]"}).find("same name as a grasp of rod"),
             std::string::npos);
-  EXPECT_NE(
-      problemsOf({"bodies=[{name: hand, mass: 1, inertia: [1, 1, 1]}]", "cloths.0.grasps.left.motion={body: hand}"})
-          .find("is simulated"),
-      std::string::npos);
+  EXPECT_NE(problemsOf(towel, {"bodies=[{name: hand, mass: 1, inertia: [1, 1, 1]}]",
+                               "cloths.0.grasps.left.motion={body: hand}"})
+                .find("is simulated"),
+            std::string::npos);
 }
 
 class ClothFiles : public ::testing::Test
@@ -225,7 +214,7 @@ TEST_F(ClothFiles, ReportsDefectsByNameWithTheFile)
 
 double weight(const Simulation& simulation) { return 9.81 * simulation.clothModel(0).totalMass(); }
 
-StepReport run(Simulation& simulation, int steps)
+StepReport mergedRun(Simulation& simulation, int steps)
 {
   StepReport total;
   for (int k = 0; k < steps && total.ok; ++k)
@@ -243,7 +232,7 @@ TEST(ClothScene, WrenchesCarryTheWeight)
                   "motion: {table: [[0, 5, 5, 5], [0.5, 4.9, 5, 5.05]]}}}",
                   "cloths.0.damping.mass=8"}));
   const Pose before = simulation.grasps().pose(1);
-  const StepReport report = run(simulation, 600);
+  const StepReport report = mergedRun(simulation, 600);
   ASSERT_TRUE(report.ok) << report.message;
   // attach: initial
   EXPECT_LT((simulation.grasps().pose(1).position - before.position - Vector3d(-0.1, 0, 0.05)).norm(), 1e-12);
@@ -267,7 +256,7 @@ TEST(ClothScene, GraspsTurnTheirVertices)
                                     "motion: {table: [[0, 0, 0, 0, 0, 0, 0, 1], [0.2, 0.1, 0, 0.1, 0.7071067811865476, "
                                     "0, 0, 0.7071067811865476]]}}}"}));
   const Eigen::Matrix3Xd points = simulation.state().cloth_grasps[0][0].points_G;
-  const StepReport report = run(simulation, 25);
+  const StepReport report = mergedRun(simulation, 25);
   ASSERT_TRUE(report.ok) << report.message;
   const ClothState& held = simulation.state().cloths[0];
   const ClothGrasp& grasp = simulation.state().cloth_grasps[0][0];
@@ -282,7 +271,7 @@ TEST(ClothScene, WindCarriesThemAlong)
 {
   Simulation simulation(parseScene(
       towel, "t", {"cloths.0.grasps={top: {edge: upper}}", "wind={velocity: [0, 0, 4]}", "gravity=[0, 0, 0]"}));
-  ASSERT_TRUE(run(simulation, 20).ok);
+  ASSERT_TRUE(mergedRun(simulation, 20).ok);
   EXPECT_GT(simulation.grasps().wrench(0).force.z(), 0.01);
   EXPECT_GT(simulation.state().cloths[0].x.row(2).mean(), 1.01);
 }
@@ -295,15 +284,15 @@ TEST(ClothScene, RestartsBitEqual)
       "cloths.0.grasps.right.motion={table: [[0, 0.3, 0, 1, 0, 0, 0, 1], [1, 0.3, 0, 1.2, 0, 0, 0, 1]]}",
       "wind={velocity: [0, 3, 0]}"};
   Simulation simulation(parseScene(towel, "t", moving));
-  ASSERT_TRUE(run(simulation, 12).ok);
+  ASSERT_TRUE(mergedRun(simulation, 12).ok);
   simulation.grasps().release(0);
-  ASSERT_TRUE(run(simulation, 3).ok);
+  ASSERT_TRUE(mergedRun(simulation, 3).ok);
   simulation.save(path);
-  ASSERT_TRUE(run(simulation, 10).ok);
+  ASSERT_TRUE(mergedRun(simulation, 10).ok);
   Simulation again(parseScene(towel, "t", moving));
   again.load(path);
   EXPECT_FALSE(again.grasps().isActive(0));
-  ASSERT_TRUE(run(again, 10).ok);
+  ASSERT_TRUE(mergedRun(again, 10).ok);
   EXPECT_EQ(again.state().cloths[0].x, simulation.state().cloths[0].x);
   EXPECT_EQ(again.state().cloths[0].v, simulation.state().cloths[0].v);
   EXPECT_EQ(again.grasps().wrench(1).torque, simulation.grasps().wrench(1).torque);
@@ -315,17 +304,17 @@ TEST(ClothScene, RestartsBitEqual)
 TEST(ClothScene, TakesHoldAndLetsGo)
 {
   Simulation simulation(parseScene(towel, "t"));
-  ASSERT_TRUE(run(simulation, 5).ok);
+  ASSERT_TRUE(mergedRun(simulation, 5).ok);
   simulation.grasps().release(0);
   EXPECT_EQ(simulation.state().cloths[0].pins, (std::vector<int>{8, 17, 18, 62}));
   EXPECT_EQ(simulation.grasps().wrench(0).force, Vector3d(0, 0, 0));
-  ASSERT_TRUE(run(simulation, 5).ok);
+  ASSERT_TRUE(mergedRun(simulation, 5).ok);
   EXPECT_THROW(simulation.grasps().attachVertices(0, {17}), std::invalid_argument);
   EXPECT_THROW(simulation.grasps().attachVertices(0, {}), std::invalid_argument);
   EXPECT_THROW(simulation.grasps().attach(0, -1, 3, Hold::frame), std::invalid_argument);
   const Vector3d held = simulation.state().cloths[0].x.col(40);
   simulation.grasps().attachVertices(0, {41, 40, 40});
-  ASSERT_TRUE(run(simulation, 5).ok);
+  ASSERT_TRUE(mergedRun(simulation, 5).ok);
   EXPECT_LT((simulation.state().cloths[0].x.col(40) - held).norm(), 1e-15);
   simulation.reset();
   EXPECT_EQ(simulation.state().cloth_grasps[0][0].vertices, std::vector<int>{54});
@@ -335,7 +324,7 @@ TEST(ClothScene, TakesHoldAndLetsGo)
 TEST(ClothScene, FailsWithoutTrace)
 {
   Simulation simulation(parseScene(towel, "t"));
-  ASSERT_TRUE(run(simulation, 3).ok);
+  ASSERT_TRUE(mergedRun(simulation, 3).ok);
   const Eigen::Matrix3Xd before = simulation.state().cloths[0].x;
   SceneInputs inputs = simulation.defaultInputs();
   inputs.grasps[1].X_WG.position.x() = std::nan("");
@@ -344,7 +333,7 @@ TEST(ClothScene, FailsWithoutTrace)
   EXPECT_NE(report.message.find("pin positions"), std::string::npos) << report.message;
   EXPECT_EQ(simulation.state().cloths[0].x, before);
   EXPECT_TRUE(simulation.grasps().pose(1).position.allFinite());
-  EXPECT_TRUE(run(simulation, 3).ok);
+  EXPECT_TRUE(mergedRun(simulation, 3).ok);
 }
 
 }   // namespace

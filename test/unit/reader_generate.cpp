@@ -195,15 +195,15 @@ TEST(Generate, curlIsNaturalOnly)
   EXPECT_FALSE(parseScene("generate: [{hair: {strands: 3}}]").rods[0].initial);
 }
 
-struct Case
+struct GeneratorCase
 {
   const char* text;
   const char* expected;
 };
 
-void PrintTo(const Case& c, std::ostream* out) { *out << c.text; }
+void PrintTo(const GeneratorCase& c, std::ostream* out) { *out << c.text; }
 
-class BadGenerator : public testing::TestWithParam<Case>
+class BadGenerator : public testing::TestWithParam<GeneratorCase>
 {};
 
 TEST_P(BadGenerator, isRefusedWithPathAndRange)
@@ -225,36 +225,39 @@ TEST_P(BadGenerator, isRefusedWithPathAndRange)
 INSTANTIATE_TEST_SUITE_P(
     All, BadGenerator,
     testing::Values(
-        Case{"generate: {chain: {}}", "generate: is a map; must be a list"},
-        Case{"generate: [{}]", "generate.0: must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}"},
-        Case{"generate: [{chain: {}, tree: {}}]", "must be one of"},
-        Case{"generate: [{bush: {}}]", "bush: unknown key"},
-        Case{"generate: [{chain: {links: 0}}]",
-             "generate.0.chain.links = 0: is out of range; must be a whole number in [1, 10000]"},
-        Case{"generate: [{chain: {spacing: 0.05}}]",
-             "spacing = 0.05: is out of range; must be a number in (0.055, 0.09) m"},
-        Case{"generate: [{chain: {cross_section: {radius: 0.02}}}]",
-             "the wire is too thick: its radius 0.02 m must be less than a fifth"},
-        Case{"generate: [{chain: {up: [1, 0, 0]}}]", "up = [1, 0, 0]: is along direction"},
-        Case{"generate: [{chain: {opening: 2}}]", "in [0, 1.570796327] rad"},
-        Case{"generate: [{chain: {length: 2}}]", "length = 2: unknown key"},
-        Case{"generate: [{chain: {}}, {chain: {}}]",
-             "generate.1.chain: makes a rod chain_0, whose name is taken; give the generator another name"},
-        Case{"{rods: [{name: chain_1}], generate: [{chain: {}}]}", "makes a rod chain_1, whose name is taken"},
-        Case{"generate: [{tree: {vertices: 200}}]", "vertices = 200: is too few for 57 branches; must be at least 285"},
-        Case{"generate: [{tree: {vertices: 290}}]", "vertices = 290: gives tree_0 too few (6) for its 7 children"},
-        Case{"generate: [{tree: {angle: 2}}]", "rad"},
-        Case{"generate: [{tree: {direction: [0, 0, 0]}}]", "must not be zero"},
-        Case{"generate: [{tree: {cross_section: {radius: 1}}}]", "unknown key"},
-        Case{"generate: [{hair: {strands: 0}}]", "in [1, 100000]"},
-        Case{"generate: [{hair: {head: {motion: free}}}]", "must be one of: fixed, topic"},
-        Case{"generate: [{hair: {head: {size: 3}}}]", "unknown key"},
-        Case{"generate: [{hair: {curl: {radius: 0}}}]", "in (0, 1000000] m"},
-        Case{"{generate: [{hair: {}}], obstacles: [{name: head, shape: {sphere: {}}}]}",
-             "generate.0.hair: makes head, which is also the name of obstacles.0"},
-        Case{"{generate: [{hair: {}}], bodies: [{mass: 1, shape: {sphere: {}}, welds: [{rod: hair_0, edge: 0}]}]}",
-             "grasp hair_0_root holds nodes 0 to 0"},
-        Case{"{}", "rods: is missing"}));
+        GeneratorCase{"generate: {chain: {}}", "generate: is a map; must be a list"},
+        GeneratorCase{"generate: [{}]", "generate.0: must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}"},
+        GeneratorCase{"generate: [{chain: {}, tree: {}}]", "must be one of"},
+        GeneratorCase{"generate: [{bush: {}}]", "bush: unknown key"},
+        GeneratorCase{"generate: [{chain: {links: 0}}]",
+                      "generate.0.chain.links = 0: is out of range; must be a whole number in [1, 10000]"},
+        GeneratorCase{"generate: [{chain: {spacing: 0.05}}]",
+                      "spacing = 0.05: is out of range; must be a number in (0.055, 0.09) m"},
+        GeneratorCase{"generate: [{chain: {cross_section: {radius: 0.02}}}]",
+                      "the wire is too thick: its radius 0.02 m must be less than a fifth"},
+        GeneratorCase{"generate: [{chain: {up: [1, 0, 0]}}]", "up = [1, 0, 0]: is along direction"},
+        GeneratorCase{"generate: [{chain: {opening: 2}}]", "in [0, 1.570796327] rad"},
+        GeneratorCase{"generate: [{chain: {length: 2}}]", "length = 2: unknown key"},
+        GeneratorCase{"generate: [{chain: {}}, {chain: {}}]",
+                      "generate.1.chain: makes a rod chain_0, whose name is taken; give the generator another name"},
+        GeneratorCase{"{rods: [{name: chain_1}], generate: [{chain: {}}]}", "makes a rod chain_1, whose name is taken"},
+        GeneratorCase{"generate: [{tree: {vertices: 200}}]",
+                      "vertices = 200: is too few for 57 branches; must be at least 285"},
+        GeneratorCase{"generate: [{tree: {vertices: 290}}]",
+                      "vertices = 290: gives tree_0 too few (6) for its 7 children"},
+        GeneratorCase{"generate: [{tree: {angle: 2}}]", "rad"},
+        GeneratorCase{"generate: [{tree: {direction: [0, 0, 0]}}]", "must not be zero"},
+        GeneratorCase{"generate: [{tree: {cross_section: {radius: 1}}}]", "unknown key"},
+        GeneratorCase{"generate: [{hair: {strands: 0}}]", "in [1, 100000]"},
+        GeneratorCase{"generate: [{hair: {head: {motion: free}}}]", "must be one of: fixed, topic"},
+        GeneratorCase{"generate: [{hair: {head: {size: 3}}}]", "unknown key"},
+        GeneratorCase{"generate: [{hair: {curl: {radius: 0}}}]", "in (0, 1000000] m"},
+        GeneratorCase{"{generate: [{hair: {}}], obstacles: [{name: head, shape: {sphere: {}}}]}",
+                      "generate.0.hair: makes head, which is also the name of obstacles.0"},
+        GeneratorCase{
+            "{generate: [{hair: {}}], bodies: [{mass: 1, shape: {sphere: {}}, welds: [{rod: hair_0, edge: 0}]}]}",
+            "grasp hair_0_root holds nodes 0 to 0"},
+        GeneratorCase{"{}", "rods: is missing"}));
 
 }   // namespace
 }   // namespace slender

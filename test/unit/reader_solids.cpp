@@ -1,12 +1,16 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/scene/reader.h"
+#include "test/support/scenes.h"
 
 /// Bodies, obstacles and contact in the scene file.
 namespace slender {
 namespace {
 
-const char* const good_scene = R"(name: test
+using test::BadOverride;
+using test::problemsOf;
+
+const char* const solid_scene = R"(name: test
 contact: {slip_speed: 1e-3}
 rods:
   - name: rope
@@ -41,19 +45,6 @@ bodies:
   - {name: driven, motion: {topic: true}, welds: [{rod: rope, edge: 7}]}
 )";
 
-std::string problemsOf(const std::vector<std::string>& overrides)
-{
-  try
-  {
-    parseScene(good_scene, "test.yaml", overrides);
-  }
-  catch (const SceneError& error)
-  {
-    return error.what();
-  }
-  return "";
-}
-
 /// Methods of second order make what hits something bounce.
 TEST(ReaderSolids, contactOfAnyKindMakesImplicitEulerTheDefault)
 {
@@ -81,14 +72,14 @@ TEST(ReaderSolids, contactOfAnyKindMakesImplicitEulerTheDefault)
 
 TEST(ReaderSolids, tellsThatContactChoosesTheIntegratorOfRodsWithoutIt)
 {
-  EXPECT_EQ(parseScene(good_scene).notes.size(), 1u);   // the ring has no contact
-  EXPECT_TRUE(parseScene(good_scene, "test.yaml", {"rods.1.contact={}"}).notes.empty());
-  EXPECT_TRUE(parseScene(good_scene, "test.yaml", {"time.integrator=implicit_euler"}).notes.empty());
+  EXPECT_EQ(parseScene(solid_scene).notes.size(), 1u);   // the ring has no contact
+  EXPECT_TRUE(parseScene(solid_scene, "test.yaml", {"rods.1.contact={}"}).notes.empty());
+  EXPECT_TRUE(parseScene(solid_scene, "test.yaml", {"time.integrator=implicit_euler"}).notes.empty());
 }
 
 TEST(ReaderSolids, readsContact)
 {
-  const SceneConfig scene = parseScene(good_scene);
+  const SceneConfig scene = parseScene(solid_scene);
   EXPECT_DOUBLE_EQ(scene.contact.gap, 0.0002);   // of the rope's smaller half axis; the ring takes no part
   EXPECT_EQ(scene.contact.slip_speed, 1e-3);
   ASSERT_TRUE(scene.rods[0].contact);
@@ -96,7 +87,7 @@ TEST(ReaderSolids, readsContact)
   EXPECT_EQ(scene.rods[0].contact->friction, 0.5);
   EXPECT_FALSE(scene.rods[1].contact);
   const SceneConfig other =
-      parseScene(good_scene, "t", {"rods.1.contact={self: false, rods: no}", "contact.gap=0.003"});
+      parseScene(solid_scene, "t", {"rods.1.contact={self: false, rods: no}", "contact.gap=0.003"});
   EXPECT_EQ(other.contact.gap, 0.003);
   ASSERT_TRUE(other.rods[1].contact);
   EXPECT_FALSE(other.rods[1].contact->self || other.rods[1].contact->others);
@@ -107,7 +98,7 @@ TEST(ReaderSolids, readsContact)
 
 TEST(ReaderSolids, readsObstacles)
 {
-  const SceneConfig scene = parseScene(good_scene);
+  const SceneConfig scene = parseScene(solid_scene);
   ASSERT_EQ(scene.obstacles.size(), 4u);
   const auto& [floor, pin, door, hand] =
       std::tie(scene.obstacles[0], scene.obstacles[1], scene.obstacles[2], scene.obstacles[3]);
@@ -128,7 +119,7 @@ TEST(ReaderSolids, readsObstacles)
 
 TEST(ReaderSolids, readsBodies)
 {
-  const SceneConfig scene = parseScene(good_scene);
+  const SceneConfig scene = parseScene(solid_scene);
   ASSERT_EQ(scene.bodies.size(), 4u);
   const BodyConfig& bob = scene.bodies[0];
   EXPECT_EQ(bob.mass, 2);
@@ -167,7 +158,7 @@ TEST(ReaderSolids, readsBodies)
 TEST(ReaderSolids, aBodyIsFreeUnlessItsMotionIsGiven)
 {
   const auto motion = [](const std::string& value) {
-    return parseScene(good_scene, "t", {"bodies.1.motion=" + value}).bodies[1].motion;
+    return parseScene(solid_scene, "t", {"bodies.1.motion=" + value}).bodies[1].motion;
   };
   EXPECT_FALSE(motion("free"));
   ASSERT_TRUE(motion("fixed"));
@@ -186,7 +177,7 @@ TEST(ReaderSolids, meshesAreCentredWhenSimulated)
   const auto read = [&](const std::vector<std::string>& more) {
     std::vector<std::string> all{"bodies.1.shape=" + mesh, pose};
     all.insert(all.end(), more.begin(), more.end());
-    return parseScene(good_scene, "t", all).bodies[1];
+    return parseScene(solid_scene, "t", all).bodies[1];
   };
   const BodyConfig free = read({});   // corners at 0 and 0.1
   EXPECT_NEAR(free.mass, 1, 1e-12);
@@ -198,20 +189,12 @@ TEST(ReaderSolids, meshesAreCentredWhenSimulated)
   EXPECT_EQ(driven.X_BS.position, Eigen::Vector3d(0, 0, 0));
 }
 
-struct Case
-{
-  const char* override_text;
-  const char* expected;
-};
-
-void PrintTo(const Case& c, std::ostream* out) { *out << c.override_text; }
-
-class BadSolid : public testing::TestWithParam<Case>
+class BadSolid : public testing::TestWithParam<BadOverride>
 {};
 
 TEST_P(BadSolid, isRefusedWithPathAndRange)
 {
-  const std::string message = problemsOf({GetParam().override_text});
+  const std::string message = problemsOf(solid_scene, {GetParam().override_text});
   EXPECT_NE(message.find(GetParam().expected), std::string::npos) << GetParam().override_text << "\ngave: " << message;
   EXPECT_EQ(message.find('\n'), std::string::npos) << "more than one problem:\n" << message;
   EXPECT_TRUE(message.find("--set " + std::string(GetParam().override_text)) == 0 || message.find("test.yaml:") == 0)
@@ -220,84 +203,95 @@ TEST_P(BadSolid, isRefusedWithPathAndRange)
 
 INSTANTIATE_TEST_SUITE_P(
     Contact, BadSolid,
-    testing::Values(Case{"contact.gap=0", "contact.gap = 0: is out of range; must be a number in (0, 1] m"},
-                    Case{"contact.slip_speed=0", "in (0, 10] m/s"},
-                    Case{"contact.self=true", "unknown key; known here: gap, slip_speed"},
-                    Case{"rods.0.contact.self=maybe", "must be true or false"},
-                    Case{"rods.0.contact.friction=-0.1",
-                         "rods.0.contact.friction = -0.1: is out of range; must be a number in [0, 100]"},
-                    Case{"rods.0.contact.bodies=true", "unknown key; known here: self, rods, obstacles, friction"},
-                    Case{"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: takes no contact"},
-                    Case{"rods.0.contact=true", "must be a map"}));
+    testing::Values(
+        BadOverride{"contact.gap=0", "contact.gap = 0: is out of range; must be a number in (0, 1] m"},
+        BadOverride{"contact.slip_speed=0", "in (0, 10] m/s"},
+        BadOverride{"contact.self=true", "unknown key; known here: gap, slip_speed"},
+        BadOverride{"rods.0.contact.self=maybe", "must be true or false"},
+        BadOverride{"rods.0.contact.friction=-0.1",
+                    "rods.0.contact.friction = -0.1: is out of range; must be a number in [0, 100]"},
+        BadOverride{"rods.0.contact.bodies=true", "unknown key; known here: self, rods, obstacles, friction"},
+        BadOverride{"time.integrator=symplectic_euler", "time.integrator = symplectic_euler: takes no contact"},
+        BadOverride{"rods.0.contact=true", "must be a map"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Obstacle, BadSolid,
     testing::Values(
-        Case{"obstacles=3", "must be a list"},
-        Case{"obstacles.0.shape=plane",
-             "obstacles.0.shape = plane: must be a map with one shape and its measures, e.g. {plane: {}}"},
-        Case{"obstacles.0.name=the floor", "is not a name"},
-        Case{"obstacles.0.name=pin", "is also the name of obstacles.0"},
-        Case{"obstacles.0.name=bob",
-             "bodies.0.name = bob: is also the name of obstacles.0; names of bodies and obstacles must differ"},
-        Case{"obstacles.0.mass=1", "unknown key; known here: name, pose, shape, friction, motion"},
-        Case{"obstacles.0.shape={}", "names 0 shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh"},
-        Case{"obstacles.0.shape={sphere: {}, box: {}}", "names 2 shapes"},
-        Case{"obstacles.0.shape={ball: {}}", "unknown key"},
-        Case{"obstacles.0.shape.plane.normal=[0, 0, 0]", "must not be zero"},
-        Case{"obstacles.0.pose={position: [0, 0, 0]}", "there is a pose as well"},
-        Case{"obstacles.0.friction=-1", "in [0, 100]"}, Case{"obstacles.0.motion=free", "must be one of: fixed, topic"},
-        Case{"obstacles.0.motion={body: bob}",
-             "must be fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}"},
-        Case{"obstacles.0.motion={topic: false}", "must be true"},
-        Case{"obstacles.0.motion={file: nowhere.csv}", "nowhere.csv: cannot be opened"},
-        Case{"obstacles.2.pose={}", "there is a table of poses as well; the obstacle starts at its first"},
-        Case{"obstacles.2.motion={table: [[0, 1, 2]]}",
-             "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z]"},
-        Case{"obstacles.1.shape.cylinder.radius=0", "in (0, 1000000] m"},
-        Case{"obstacles.1.shape.cylinder.height=1", "unknown key; known here: radius, length"},
-        Case{"obstacles.1.shape={box: {size: 1}}", "must be a list [x, y, z]"},
-        Case{"obstacles.1.shape={box: {size: [1, 0, 1]}}", "size.1 = 0"},
-        Case{"obstacles.1.shape={mesh: {}}", "file: is missing"},
-        Case{"obstacles.1.shape={mesh: {file: nowhere.obj}}", "nowhere.obj: cannot be opened"},
-        Case{"obstacles.1.pose.orientation=[0, 0, 0, 1]",
-             "must have either orientation: [x, y, z, w] or rpy: [roll, pitch, yaw]"},
-        Case{"obstacles.1.pose={orientation: [0, 0, 1]}", "has 3 entries; must be a unit quaternion [x, y, z, w]"},
-        Case{"obstacles.1.pose={orientation: [0, 0, 1, 1]}", "quaternion's length is 1.41421"},
-        Case{"obstacles.1.pose.rpy=[0, 1]", "has 2 entries"}, Case{"obstacles.1.pose.angle=1", "unknown key"}));
+        BadOverride{"obstacles=3", "must be a list"},
+        BadOverride{"obstacles.0.shape=plane",
+                    "obstacles.0.shape = plane: must be a map with one shape and its measures, e.g. {plane: {}}"},
+        BadOverride{"obstacles.0.name=the floor", "is not a name"},
+        BadOverride{"obstacles.0.name=pin", "is also the name of obstacles.0"},
+        BadOverride{"obstacles.0.name=bob",
+                    "bodies.0.name = bob: is also the name of obstacles.0; names of bodies and obstacles must differ"},
+        BadOverride{"obstacles.0.mass=1", "unknown key; known here: name, pose, shape, friction, motion"},
+        BadOverride{"obstacles.0.shape={}",
+                    "names 0 shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh"},
+        BadOverride{"obstacles.0.shape={sphere: {}, box: {}}", "names 2 shapes"},
+        BadOverride{"obstacles.0.shape={ball: {}}", "unknown key"},
+        BadOverride{"obstacles.0.shape.plane.normal=[0, 0, 0]", "must not be zero"},
+        BadOverride{"obstacles.0.pose={position: [0, 0, 0]}", "there is a pose as well"},
+        BadOverride{"obstacles.0.friction=-1", "in [0, 100]"},
+        BadOverride{"obstacles.0.motion=free", "must be one of: fixed, topic"},
+        BadOverride{"obstacles.0.motion={body: bob}",
+                    "must be fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}"},
+        BadOverride{"obstacles.0.motion={topic: false}", "must be true"},
+        BadOverride{"obstacles.0.motion={file: nowhere.csv}", "nowhere.csv: cannot be opened"},
+        BadOverride{"obstacles.2.pose={}", "there is a table of poses as well; the obstacle starts at its first"},
+        BadOverride{"obstacles.2.motion={table: [[0, 1, 2]]}",
+                    "has 3 numbers; must be [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z]"},
+        BadOverride{"obstacles.1.shape.cylinder.radius=0", "in (0, 1000000] m"},
+        BadOverride{"obstacles.1.shape.cylinder.height=1", "unknown key; known here: radius, length"},
+        BadOverride{"obstacles.1.shape={box: {size: 1}}", "must be a list [x, y, z]"},
+        BadOverride{"obstacles.1.shape={box: {size: [1, 0, 1]}}", "size.1 = 0"},
+        BadOverride{"obstacles.1.shape={mesh: {}}", "file: is missing"},
+        BadOverride{"obstacles.1.shape={mesh: {file: nowhere.obj}}", "nowhere.obj: cannot be opened"},
+        BadOverride{"obstacles.1.pose.orientation=[0, 0, 0, 1]",
+                    "must have either orientation: [x, y, z, w] or rpy: [roll, pitch, yaw]"},
+        BadOverride{"obstacles.1.pose={orientation: [0, 0, 1]}",
+                    "has 3 entries; must be a unit quaternion [x, y, z, w]"},
+        BadOverride{"obstacles.1.pose={orientation: [0, 0, 1, 1]}", "quaternion's length is 1.41421"},
+        BadOverride{"obstacles.1.pose.rpy=[0, 1]", "has 2 entries"},
+        BadOverride{"obstacles.1.pose.angle=1", "unknown key"}));
 
 INSTANTIATE_TEST_SUITE_P(
     Body, BadSolid,
     testing::Values(
-        Case{"bodies.1.name=bob", "is also the name of bodies.0"},
-        Case{"bodies.1.mass=1", "must have either mass or density"},
-        Case{"bodies.1.density=0", "in (0, 1000000] kg/m^3"}, Case{"bodies.0.mass=-2", "in (0, 1000000000] kg"},
-        Case{"bodies.2={name: point}", "must have a mass, or a density and a shape"},
-        Case{"bodies.2={name: point, mass: 1}", "inertia: is missing; a body without a shape needs [Ixx, Iyy, Izz]"},
-        Case{"bodies.2={name: point, density: 1, inertia: [1, 1, 1]}", "density = 1: needs a shape"},
-        Case{"bodies.2.inertia=[1, 2, 4]", "bodies.2.inertia = [1, 2, 4]: body point: principal moments"},
-        Case{"bodies.2.inertia=[1, 2, 0]", "inertia.2 = 0"}, Case{"bodies.2.inertia=[1, 2]", "has 2 entries"},
-        Case{"bodies.2.inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]", "must be symmetric"},
-        Case{"bodies.1.shape={plane: {}}", "mass of a plane"},
-        Case{"bodies.1.shape={sphere: {radius: -1}}", "in (0, 1000000] m"},
-        Case{"bodies.0.motion=fixed", "the body's motion is given; only free bodies start with a velocity"},
-        Case{"bodies.1.motion=moving", "must be one of: fixed, topic, free"},
-        Case{"bodies.1.motion={}", "must be free, fixed or one of"},
-        Case{"bodies.0.velocity.linear=1", "must be a list [x, y, z]"},
-        Case{"bodies.0.velocity.speed=1", "unknown key"}, Case{"bodies.0.damping.linear=-1", "in [0, 1000000] 1/s"},
-        Case{"bodies.0.gravity=[0, 0, 1]", "must be true or false"},
-        Case{"bodies.0.colour=red", "unknown key; known here: name"}, Case{"bodies.0.welds=rope", "must be a list"},
-        Case{"bodies.0.welds.0.rod=rop",
-             "welds.0.rod = rop: is no rod of the scene (did you mean rope?); it has: rope, ring"},
-        Case{"bodies.0.welds.0={edge: 3}", "rod: is missing"}, Case{"bodies.0.welds.0.edge=10", "in [-10, 9]"},
-        Case{"bodies.0.welds.0={rod: rope}", "edge: is missing"},
-        Case{"bodies.0.welds.0.edge=0", "holds nodes 0 to 0 of rod rope; grasp left holds nodes 0 to 0"},
-        Case{"bodies.0.welds.0.edge=4", "holds nodes 4 to 5 of rod rope; grasp middle holds nodes 5 to 5"},
-        Case{"bodies.0.welds.1={rod: rope, edge: 9}", "a weld of body bob holds nodes 10 to 10"},
-        Case{"bodies.3.welds.0={rod: ring, edge: 2}",
-             "holds nodes 2 to 3 of rod ring; a weld of body bob holds nodes 3 to 4"},
-        Case{"bodies.0.welds.1.edge=-1", "holds the edge that joins the last node to the first"},
-        Case{"rods.0.grasps.middle.motion.body=bob", "body bob is simulated; weld the rod to it instead"}));
+        BadOverride{"bodies.1.name=bob", "is also the name of bodies.0"},
+        BadOverride{"bodies.1.mass=1", "must have either mass or density"},
+        BadOverride{"bodies.1.density=0", "in (0, 1000000] kg/m^3"},
+        BadOverride{"bodies.0.mass=-2", "in (0, 1000000000] kg"},
+        BadOverride{"bodies.2={name: point}", "must have a mass, or a density and a shape"},
+        BadOverride{"bodies.2={name: point, mass: 1}",
+                    "inertia: is missing; a body without a shape needs [Ixx, Iyy, Izz]"},
+        BadOverride{"bodies.2={name: point, density: 1, inertia: [1, 1, 1]}", "density = 1: needs a shape"},
+        BadOverride{"bodies.2.inertia=[1, 2, 4]", "bodies.2.inertia = [1, 2, 4]: body point: principal moments"},
+        BadOverride{"bodies.2.inertia=[1, 2, 0]", "inertia.2 = 0"},
+        BadOverride{"bodies.2.inertia=[1, 2]", "has 2 entries"},
+        BadOverride{"bodies.2.inertia=[[1, 0, 0], [0, 1, 0.1], [0, 0, 1]]", "must be symmetric"},
+        BadOverride{"bodies.1.shape={plane: {}}", "mass of a plane"},
+        BadOverride{"bodies.1.shape={sphere: {radius: -1}}", "in (0, 1000000] m"},
+        BadOverride{"bodies.0.motion=fixed", "the body's motion is given; only free bodies start with a velocity"},
+        BadOverride{"bodies.1.motion=moving", "must be one of: fixed, topic, free"},
+        BadOverride{"bodies.1.motion={}", "must be free, fixed or one of"},
+        BadOverride{"bodies.0.velocity.linear=1", "must be a list [x, y, z]"},
+        BadOverride{"bodies.0.velocity.speed=1", "unknown key"},
+        BadOverride{"bodies.0.damping.linear=-1", "in [0, 1000000] 1/s"},
+        BadOverride{"bodies.0.gravity=[0, 0, 1]", "must be true or false"},
+        BadOverride{"bodies.0.colour=red", "unknown key; known here: name"},
+        BadOverride{"bodies.0.welds=rope", "must be a list"},
+        BadOverride{"bodies.0.welds.0.rod=rop",
+                    "welds.0.rod = rop: is no rod of the scene (did you mean rope?); it has: rope, ring"},
+        BadOverride{"bodies.0.welds.0={edge: 3}", "rod: is missing"},
+        BadOverride{"bodies.0.welds.0.edge=10", "in [-10, 9]"},
+        BadOverride{"bodies.0.welds.0={rod: rope}", "edge: is missing"},
+        BadOverride{"bodies.0.welds.0.edge=0", "holds nodes 0 to 0 of rod rope; grasp left holds nodes 0 to 0"},
+        BadOverride{"bodies.0.welds.0.edge=4", "holds nodes 4 to 5 of rod rope; grasp middle holds nodes 5 to 5"},
+        BadOverride{"bodies.0.welds.1={rod: rope, edge: 9}", "a weld of body bob holds nodes 10 to 10"},
+        BadOverride{"bodies.3.welds.0={rod: ring, edge: 2}",
+                    "holds nodes 2 to 3 of rod ring; a weld of body bob holds nodes 3 to 4"},
+        BadOverride{"bodies.0.welds.1.edge=-1", "holds the edge that joins the last node to the first"},
+        BadOverride{"rods.0.grasps.middle.motion.body=bob", "body bob is simulated; weld the rod to it instead"}));
 
 }   // namespace
 }   // namespace slender

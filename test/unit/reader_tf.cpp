@@ -2,10 +2,13 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
+#include "test/support/scenes.h"
 
 /// What follows frames of tf, and where it is in them.
 namespace slender {
 namespace {
+
+using test::problemsOf;
 
 const char* const scene_text = R"(name: test
 time: {step: 0.01}
@@ -22,19 +25,6 @@ obstacles:
 bodies:
   - {name: cart, shape: {sphere: {radius: 0.1}}, motion: {tf: base, offset: {rpy: [0, 0, 1]}}}
 )";
-
-std::string refusalOf(const std::string& override_text)
-{
-  try
-  {
-    parseScene(scene_text, "t", {override_text});
-  }
-  catch (const SceneError& error)
-  {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(ReaderTf, readsFramesAndOffsets)
 {
@@ -80,7 +70,8 @@ TEST(ReaderTf, refusesWhatCannotBeFollowed)
       {obstacle + "{table: [[0, 0, 0, 0]], offset: {}}", "offset: is for motion: {tf: FRAME}"},
   };
   for (const auto& [change, reason] : wrong)
-    EXPECT_NE(refusalOf(change).find(reason), std::string::npos) << change << "\n" << refusalOf(change);
+    EXPECT_NE(problemsOf(scene_text, {change}).find(reason), std::string::npos) << change << "\n"
+                                                                                << problemsOf(scene_text, {change});
 }
 
 /// `offset` of a grasp: with any motion, and once.
@@ -104,7 +95,9 @@ TEST(ReaderTf, aGraspMayHaveAnOffset)
       {"{edges: [0], motion: {table: [[0, 0, 0, 1]]}, direction: [0, 0, 1], " + offset + "}", "turns the section"},
   };
   for (const auto& [change, reason] : wrong)
-    EXPECT_NE(refusalOf(grasp + change).find(reason), std::string::npos) << change << "\n" << refusalOf(grasp + change);
+    EXPECT_NE(problemsOf(scene_text, {grasp + change}).find(reason), std::string::npos)
+        << change << "\n"
+        << problemsOf(scene_text, {grasp + change});
 }
 
 /// A table, and an obstacle that moves, carry the section at the offset; a reset brings it back.

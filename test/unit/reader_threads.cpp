@@ -4,9 +4,12 @@
 
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
+#include "test/support/scenes.h"
 
 namespace slender {
 namespace {
+
+using test::problemsOf;
 
 const char* const honey = R"(
 name: honey
@@ -20,19 +23,6 @@ threads:
     breakup_radius: 1.0e-5
     region: {from: [-1, -1, -1], to: [1, 1, 1]}
 )";
-
-std::string problemsOf(const std::string& override_text)
-{
-  try
-  {
-    parseScene(honey, "t", {override_text});
-  }
-  catch (const SceneError& error)
-  {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(ThreadReader, ReadsEverything)
 {
@@ -81,8 +71,8 @@ TEST(ThreadReader, NamesWhatIsWrong)
       {"start=equilibrium", "is not for threads"},
   };
   for (const auto& [assignment, expected] : cases)
-    EXPECT_NE(problemsOf(assignment).find(expected), std::string::npos)
-        << assignment << "\ngave: " << problemsOf(assignment);
+    EXPECT_NE(problemsOf(honey, {assignment}).find(expected), std::string::npos)
+        << assignment << "\ngave: " << problemsOf(honey, {assignment});
 }
 
 TEST(ThreadScene, FeedsWhatTheTableSays)

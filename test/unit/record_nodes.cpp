@@ -14,7 +14,7 @@
 namespace slender {
 namespace {
 
-const std::string kRope = "rods:\n  - {name: rope, centerline: {straight: {edges: 10}}}\n";
+const std::string kPlainRope = "rods:\n  - {name: rope, centerline: {straight: {edges: 10}}}\n";
 const std::string kMixed = R"(
 rods:
   - {name: rope, centerline: {straight: {edges: 10}}}
@@ -22,8 +22,7 @@ rods:
 cloths:
   - {name: flag, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: [2, 2], pattern: one_diagonal}}
 )";
-const std::string kThread =
-    "threads:\n  - {name: honey, fluid: {}, centerline: {straight: {edges: 4}}, radius: 0.01}\n";
+const std::string kHoney = "threads:\n  - {name: honey, fluid: {}, centerline: {straight: {edges: 4}}, radius: 0.01}\n";
 
 NodeChoice chosen(const std::string& scene, const std::string& nodes)
 {
@@ -32,23 +31,23 @@ NodeChoice chosen(const std::string& scene, const std::string& nodes)
 
 TEST(RecordNodes, AreReadAsGraspsHaveThem)
 {
-  EXPECT_TRUE(parseScene(kRope).record.nodes.empty());
-  EXPECT_EQ(chosen(kRope, "[-1, 0, 4..6]"), (NodeChoice{{"rope", {0, 4, 5, 6, 10}}}));
-  EXPECT_EQ(chosen(kRope, "{rope: [3]}"), (NodeChoice{{"rope", {3}}}));
-  EXPECT_EQ(chosen(kRope, "{rope: []}"), (NodeChoice{{"rope", {}}}));
-  EXPECT_EQ(chosen(kRope, "[]"), (NodeChoice{{"rope", {}}}));
+  EXPECT_TRUE(parseScene(kPlainRope).record.nodes.empty());
+  EXPECT_EQ(chosen(kPlainRope, "[-1, 0, 4..6]"), (NodeChoice{{"rope", {0, 4, 5, 6, 10}}}));
+  EXPECT_EQ(chosen(kPlainRope, "{rope: [3]}"), (NodeChoice{{"rope", {3}}}));
+  EXPECT_EQ(chosen(kPlainRope, "{rope: []}"), (NodeChoice{{"rope", {}}}));
+  EXPECT_EQ(chosen(kPlainRope, "[]"), (NodeChoice{{"rope", {}}}));
   // a closed rod has as many nodes as edges; the grid has 3 x 3 vertices
   EXPECT_EQ(chosen(kMixed, "{ring: [-1], flag: [-2..-1]}"), (NodeChoice{{"ring", {7}}, {"flag", {7, 8}}}));
   // rods that a generator makes
   EXPECT_EQ(chosen("generate:\n  - hair: {strands: 2, edges: 5}\n", "{hair_1: [-1]}"), (NodeChoice{{"hair_1", {5}}}));
 }
 
-struct Case
+struct NodesCase
 {
   std::string scene, nodes, part;
 };
 
-class BadRecordNodes : public testing::TestWithParam<Case>
+class BadRecordNodes : public testing::TestWithParam<NodesCase>
 {};
 
 TEST_P(BadRecordNodes, AreReported)
@@ -68,21 +67,23 @@ TEST_P(BadRecordNodes, AreReported)
 
 INSTANTIATE_TEST_SUITE_P(
     Cases, BadRecordNodes,
-    testing::Values(Case{kRope, "[11]", "must be a whole number in [-11, 10]"},
-                    Case{kRope, "{rope: [3..11]}", "must be FIRST..LAST with whole numbers in [-11, 10]"},
-                    Case{kRope, "[1.5]", "must be a whole number"}, Case{kRope, "[2, 1..3]", "names node 2 twice"},
-                    Case{kRope, "3", "must be a list"},
-                    Case{kRope, "{rop: [0]}", "is no rod or cloth of the scene (did you mean rope?)"},
-                    Case{kMixed, "[0]", "this one has 3 rods, cloths and threads; must be a map"},
-                    Case{kMixed, "{flag: [9]}", "must be a whole number in [-9, 8]"},
-                    Case{kMixed, "{ring: [8]}", "must be a whole number in [-8, 7]"},
-                    Case{kThread, "{honey: [0]}", "is a thread, whose nodes are made and dropped"},
-                    Case{kThread, "[0]", "threads are written whole"},
-                    Case{kRope + "cloths:\n  - {name: rope, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: [2, 2]}}\n",
-                         "{rope: [0]}", "is the name of a rod and of a cloth"}));
+    testing::Values(NodesCase{kPlainRope, "[11]", "must be a whole number in [-11, 10]"},
+                    NodesCase{kPlainRope, "{rope: [3..11]}", "must be FIRST..LAST with whole numbers in [-11, 10]"},
+                    NodesCase{kPlainRope, "[1.5]", "must be a whole number"},
+                    NodesCase{kPlainRope, "[2, 1..3]", "names node 2 twice"},
+                    NodesCase{kPlainRope, "3", "must be a list"},
+                    NodesCase{kPlainRope, "{rop: [0]}", "is no rod or cloth of the scene (did you mean rope?)"},
+                    NodesCase{kMixed, "[0]", "this one has 3 rods, cloths and threads; must be a map"},
+                    NodesCase{kMixed, "{flag: [9]}", "must be a whole number in [-9, 8]"},
+                    NodesCase{kMixed, "{ring: [8]}", "must be a whole number in [-8, 7]"},
+                    NodesCase{kHoney, "{honey: [0]}", "is a thread, whose nodes are made and dropped"},
+                    NodesCase{kHoney, "[0]", "threads are written whole"},
+                    NodesCase{kPlainRope +
+                                  "cloths:\n  - {name: rope, grid: {sides: [[1, 0, 0], [0, 1, 0]], cells: [2, 2]}}\n",
+                              "{rope: [0]}", "is the name of a rod and of a cloth"}));
 
 /// The cells of a column of a table, by rows.
-std::vector<std::string> column(const std::string& path, std::size_t index)
+std::vector<std::string> cellsOfColumn(const std::string& path, std::size_t index)
 {
   std::ifstream file(path);
   std::vector<std::string> cells;
@@ -123,16 +124,16 @@ TEST(RecordNodes, GiveTheRowsOfTables)
     return folder + "/" + name;
   };
   const std::string whole = write("whole", {}), some = write("some", {"record.nodes={rope: [-1, 2], flag: [4]}"});
-  EXPECT_EQ(column(whole + "/nodes.csv", 2).size(), 11u + 8u);
-  EXPECT_EQ(column(some + "/nodes.csv", 1),
+  EXPECT_EQ(cellsOfColumn(whole + "/nodes.csv", 2).size(), 11u + 8u);
+  EXPECT_EQ(cellsOfColumn(some + "/nodes.csv", 1),
             (std::vector<std::string>{"rope", "rope", "ring", "ring", "ring", "ring", "ring", "ring", "ring", "ring"}));
-  EXPECT_EQ(column(some + "/nodes.csv", 2),
+  EXPECT_EQ(cellsOfColumn(some + "/nodes.csv", 2),
             (std::vector<std::string>{"2", "10", "0", "1", "2", "3", "4", "5", "6", "7"}));
-  EXPECT_EQ(column(some + "/cloths.csv", 2), (std::vector<std::string>{"4"}));
-  EXPECT_EQ(column(some + "/cloth_fields.csv", 2), (std::vector<std::string>{"4"}));
-  EXPECT_EQ(column(some + "/rod_fields.csv", 2), column(some + "/nodes.csv", 2));
+  EXPECT_EQ(cellsOfColumn(some + "/cloths.csv", 2), (std::vector<std::string>{"4"}));
+  EXPECT_EQ(cellsOfColumn(some + "/cloth_fields.csv", 2), (std::vector<std::string>{"4"}));
+  EXPECT_EQ(cellsOfColumn(some + "/rod_fields.csv", 2), cellsOfColumn(some + "/nodes.csv", 2));
   // energies are of objects, not of nodes
-  EXPECT_EQ(column(some + "/energies.csv", 1), (std::vector<std::string>{"rope", "ring", "flag"}));
+  EXPECT_EQ(cellsOfColumn(some + "/energies.csv", 1), (std::vector<std::string>{"rope", "ring", "flag"}));
   // a row is the row of the whole table
   for (const char* table : {"/nodes.csv", "/rod_fields.csv"})
     EXPECT_EQ(firstLineWith(some + table, "rope,10,"), firstLineWith(whole + table, "rope,10,")) << table;

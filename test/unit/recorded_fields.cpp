@@ -1,8 +1,6 @@
 // What `record: {fields: [...]}` records, against formulas and against the balance of forces and moments.
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -11,13 +9,16 @@
 #include "slender_sim/scene/field_tables.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/snapshot.h"
+#include "study/framework/whole_file.h"
+#include "test/support/scenes.h"
 
 namespace slender {
 namespace {
 
 using Eigen::Vector3d;
+using test::runSteps;
 
-Simulation make(const std::string& yaml, const std::vector<std::string>& overrides = {})
+Simulation simulationOf(const std::string& yaml, const std::vector<std::string>& overrides = {})
 {
   return Simulation(parseScene(yaml, "t", overrides));
 }
@@ -25,15 +26,6 @@ Simulation make(const std::string& yaml, const std::vector<std::string>& overrid
 RodSections sections(const Simulation& simulation, int rod = 0)
 {
   return sectionsOf(simulation.rodModel(rod), simulation.state().rods[static_cast<std::size_t>(rod)]);
-}
-
-void run(Simulation& simulation, int steps)
-{
-  for (int k = 0; k < steps; ++k)
-  {
-    const StepReport report = simulation.step(simulation.defaultInputs());
-    ASSERT_TRUE(report.ok) << report.message;
-  }
 }
 
 /// Column of a table by its name.
@@ -56,7 +48,7 @@ rods:
 
 TEST(RecordedFields, TensionOfAHangingRodIsTheWeightBelow)
 {
-  const Simulation simulation = make(hanging, {"record.fields=[force, strain]"});
+  const Simulation simulation = simulationOf(hanging, {"record.fields=[force, strain]"});
   const RodModel& model = simulation.rodModel(0);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
   ASSERT_EQ(tables.size(), 1u);
@@ -87,7 +79,7 @@ TEST(RecordedFields, MomentOfACantileverIsThatOfTheWeightBeyond)
 {
   for (const char* curvature : {"tangent", "compensated"})
   {
-    const Simulation simulation = make(cantilever, {std::string("rods.0.curvature=") + curvature});
+    const Simulation simulation = simulationOf(cantilever, {std::string("rods.0.curvature=") + curvature});
     const RodModel& model = simulation.rodModel(0);
     const RodState& state = simulation.state().rods[0];
     const RodSections s = sections(simulation);
@@ -123,16 +115,16 @@ TEST(RecordedFields, BendModulusComesInTheOrderTowardsD1TowardsD2)
                                            "rods.0.material.linear_density=0.02"};
   std::vector<std::string> level = moduli;
   level.push_back("rods.0.director=[0, 1, 0]");
-  const double up_sag = -make(cantilever, moduli).state().rods[0].x(2, 40),
-               level_sag = -make(cantilever, level).state().rods[0].x(2, 40);
+  const double up_sag = -simulationOf(cantilever, moduli).state().rods[0].x(2, 40),
+               level_sag = -simulationOf(cantilever, level).state().rods[0].x(2, 40);
   EXPECT_NEAR(up_sag, 0.02 * 9.81 / (8 * 0.1), 0.05 * up_sag);   // q L^4 / (8 B), small deflection
   EXPECT_NEAR(level_sag, 0.02 * 9.81 / (8 * 0.4), 0.02 * level_sag);
-  EXPECT_NEAR(sections(make(cantilever, level)).curvature.row(0).norm(), 0.0, 1e-9);
+  EXPECT_NEAR(sections(simulationOf(cantilever, level)).curvature.row(0).norm(), 0.0, 1e-9);
 }
 
 TEST(RecordedFields, TwistMomentOfATwistedRod)
 {
-  const Simulation simulation = make(R"(
+  const Simulation simulation = simulationOf(R"(
 gravity: [0, 0, 0]
 rods:
   - name: rod
@@ -158,7 +150,7 @@ rods:
 
 TEST(RecordedFields, TwistMomentOfATurnedEndIsItsTorque)
 {
-  Simulation simulation = make(R"(
+  Simulation simulation = simulationOf(R"(
 time: {step: 0.02, integrator: implicit_euler}
 gravity: [0, 0, 0]
 rods:
@@ -170,7 +162,7 @@ rods:
     material: {density: 1100, youngs_modulus: 1.0e6, poissons_ratio: 0.45}
     grasps: {left: {edges: [0]}, right: {edges: [-1], motion: {table: [[0, 0.8, 0, 0, 0, 0, 0, 1], [1, 0.8, 0, 0, 0.8414709848, 0, 0, 0.5403023059]]}}}
 )");
-  run(simulation, 60);
+  runSteps(simulation, 60);
   const double beta = 1e6 / (2 * 1.45) * M_PI * std::pow(0.004, 4) / 2;
   const RodSections s = sections(simulation);
   for (int i = 0; i < simulation.rodModel(0).nodes(); ++i)
@@ -193,7 +185,7 @@ TEST(RecordedFields, CurvatureOfAHelixIsItsOwnToSecondOrder)
     for (int fine : {0, 1})
     {
       const int edges = fine ? 180 : 90;
-      const Simulation simulation = make(
+      const Simulation simulation = simulationOf(
           R"(
 gravity: [0, 0, 0]
 rods:
@@ -221,7 +213,7 @@ rods:
 
 TEST(RecordedFields, ARingBentFromAStraightRodCarriesOnlyItsMoment)
 {
-  const Simulation simulation = make(R"(
+  const Simulation simulation = simulationOf(R"(
 gravity: [0, 0, 0]
 rods:
   - name: ring
@@ -243,7 +235,7 @@ rods:
 /// force is the solver's own.
 TEST(RecordedFields, ForcesAreThoseThatAccelerateTheNodes)
 {
-  Simulation simulation = make(R"(
+  Simulation simulation = simulationOf(R"(
 time: {step: 0.002, integrator: implicit_euler}
 rods:
   - name: rope
@@ -253,11 +245,11 @@ rods:
     material: {density: 1100, youngs_modulus: 1.0e6, poissons_ratio: 0.45}
     grasps: {hand: {edges: [0]}, middle: {nodes: [8, 9, 10]}}
 )");
-  run(simulation, 20);
+  runSteps(simulation, 20);
   simulation.grasps().release(1);
-  run(simulation, 10);
+  runSteps(simulation, 10);
   const RodState before = simulation.state().rods[0];
-  run(simulation, 1);
+  runSteps(simulation, 1);
   const RodState& after = simulation.state().rods[0];
   const RodSections s = sections(simulation);
   const RodModel& model = simulation.rodModel(0);
@@ -273,7 +265,7 @@ rods:
 
 TEST(RecordedFields, NothingIsToldOfWhatIsHeldAsAWhole)
 {
-  const Simulation simulation = make(hanging, {"rods.0.grasps.top.edges=[0, 1, 2]"});
+  const Simulation simulation = simulationOf(hanging, {"rods.0.grasps.top.edges=[0, 1, 2]"});
   const RodSections s = sections(simulation);
   for (int j = 0; j < simulation.rodModel(0).edges(); ++j)
     EXPECT_EQ(std::isnan(s.tension[j]), j <= 2) << j;
@@ -286,7 +278,7 @@ TEST(RecordedFields, NothingIsToldOfWhatIsHeldAsAWhole)
 
 TEST(RecordedFields, ContactForcesCarryTheWeight)
 {
-  Simulation simulation = make(R"(
+  Simulation simulation = simulationOf(R"(
 time: {step: 0.005}
 record: {fields: [contact_force, energy]}
 obstacles: [{name: floor, shape: {plane: {normal: [0, 0, 1]}}}]
@@ -299,7 +291,7 @@ rods:
     damping: {mass: 20}
     contact: {friction: 0.3}
 )");
-  run(simulation, 100);
+  runSteps(simulation, 100);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
   ASSERT_EQ(tables.size(), 4u);
   EXPECT_EQ(tables[0].object, "other");
@@ -313,20 +305,12 @@ rods:
   EXPECT_GT(e.gravity, 0.0);
 }
 
-std::string fileText(const std::string& path)
-{
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 TEST(RecordedFields, AreWrittenOnlyWhenAskedFor)
 {
   const std::string folder = testing::TempDir() + "recorded_fields";
   std::filesystem::remove_all(folder);
   const auto record = [&](const std::string& name, const std::vector<std::string>& overrides) {
-    const Simulation simulation = make(hanging, overrides);
+    const Simulation simulation = simulationOf(hanging, overrides);
     CsvTables tables(folder + "/" + name);
     tables.write(snapshotOf(simulation));
     tables.finish();
@@ -338,8 +322,8 @@ TEST(RecordedFields, AreWrittenOnlyWhenAskedFor)
                       "rods.0.grasps.top.edges=[0, 1]"});
   EXPECT_FALSE(std::filesystem::exists(plain + "/rod_fields.csv"));
   EXPECT_FALSE(std::filesystem::exists(plain + "/energies.csv"));
-  EXPECT_TRUE(snapshotOf(make(hanging)).fields.empty());
-  const std::string fields = fileText(full + "/rod_fields.csv");
+  EXPECT_TRUE(snapshotOf(simulationOf(hanging)).fields.empty());
+  const std::string fields = wholeFile(full + "/rod_fields.csv");
   EXPECT_EQ(fields.substr(0, fields.find('\n')),
             "t [s],object,index,kappa1 [1/m],kappa2 [1/m],twist_rate [rad/m],strain,tension [N],fx [N],fy [N],fz "
             "[N],moment_t [N m],moment_d1 [N m],"
@@ -347,7 +331,7 @@ TEST(RecordedFields, AreWrittenOnlyWhenAskedFor)
   EXPECT_EQ(std::count(fields.begin(), fields.end(), '\n'), 22);
   EXPECT_EQ(fields.find("nan"), std::string::npos);
   EXPECT_NE(fields.find(",,,,"), std::string::npos);   // the force of the edge that is held as a whole
-  const std::string energies = fileText(full + "/energies.csv");
+  const std::string energies = wholeFile(full + "/energies.csv");
   EXPECT_EQ(energies.substr(0, energies.find('\n')),
             "t [s],object,stretch [J],bend [J],twist [J],kinetic [J],gravity [J]");
 }
@@ -386,7 +370,7 @@ cloths:
 // A thread that hangs from a nozzle without flow, so viscous that inertia is nothing against weight and viscosity.
 TEST(RecordedFields, TensionOfAHangingThreadIsTheWeightBelow)
 {
-  Simulation simulation = make(R"(
+  Simulation simulation = simulationOf(R"(
 time: {step: 0.01}
 record: {fields: [force, strain, curvature]}
 threads:
@@ -396,7 +380,7 @@ threads:
     radius: 0.005
     ends: {newest: held}
 )");
-  run(simulation, 5);
+  runSteps(simulation, 5);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
   ASSERT_EQ(tables.size(), 1u);
   EXPECT_EQ(tables[0].table, "thread_fields");
@@ -429,7 +413,7 @@ threads:
 TEST(RecordedFields, FluxOfAThreadIsThatOfTheNozzle)
 {
   // fed slowly and in free air: near the nozzle the section has not changed yet, so that the flux is the flow
-  Simulation simulation = make(R"(
+  Simulation simulation = simulationOf(R"(
 time: {step: 0.002}
 record: {fields: [strain]}
 threads:
@@ -437,7 +421,7 @@ threads:
     fluid: {density: 1400, viscosity: 100}
     nozzle: {position: [0, 0, 1], diameter: 0.01, flow: 2.0e-6}
 )");
-  run(simulation, 100);
+  runSteps(simulation, 100);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
   ASSERT_EQ(tables.size(), 1u);
   const Eigen::VectorXd flux = column(tables[0], "flux [m^3/s]");
@@ -446,7 +430,7 @@ threads:
 
 TEST(RecordedFields, CurvatureOfAThreadIsThatOfItsArc)
 {
-  const Simulation simulation = make(R"(
+  const Simulation simulation = simulationOf(R"(
 record: {fields: [curvature]}
 threads:
   - name: bow

@@ -1,16 +1,14 @@
 // Models, states and grasps from shapes.
 #include <functional>
-#include <limits>
 
 #include <gtest/gtest.h>
 
 #include "slender_sim/geometry/rotation.h"
+#include "test/support/special_numbers.h"
 #include "test/support/trial.h"
 
 namespace slender::test {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
 
 Matrix3Xd unevenNodes()
 {

@@ -11,7 +11,7 @@
 namespace slender::test {
 namespace {
 
-struct Case
+struct DerivativeCase
 {
   std::string name;
   bool closed;
@@ -21,7 +21,7 @@ struct Case
   bool straight = false;   ///< naturally straight and isotropic
 };
 
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const DerivativeCase& c, std::ostream* out) { *out << c.name; }
 
 /// A rod of odd stiffness, curved, twisted, displaced from its rest shape and loaded: every term is at work.
 struct LoadedRod
@@ -30,7 +30,7 @@ struct LoadedRod
   RodSystem system;
   Eigen::Matrix4Xd viscous_strain;
 
-  LoadedRod(const Case& c, int n, Random& random) : rod(make(c, n, random)), system(*rod.model)
+  LoadedRod(const DerivativeCase& c, int n, Random& random) : rod(make(c, n, random)), system(*rod.model)
   {
     system.load(rod.state);
     if (c.viscous_ratio > 0)
@@ -53,7 +53,7 @@ struct LoadedRod
       system.setTwistLoads(torques);
   }
 
-  static Rod make(const Case& c, int n, Random& random)
+  static Rod make(const DerivativeCase& c, int n, Random& random)
   {
     const Matrix3Xd rest = wigglyNodes(n, c.closed, random);
     const int edges = c.closed ? n : n - 1;
@@ -99,7 +99,7 @@ void checkHessian(LoadedRod& s, Random& random, int samples, double tolerance)
   }
 }
 
-class RodDerivatives : public ::testing::TestWithParam<Case>
+class RodDerivatives : public ::testing::TestWithParam<DerivativeCase>
 {};
 
 TEST_P(RodDerivatives, Gradient)
@@ -147,7 +147,7 @@ TEST_P(RodDerivatives, HessianOfALongRodAssembledByPieces)
 {
   Random random(44);
   const int n = 600;   // more than two pieces of 256 nodes
-  Case c = GetParam();
+  DerivativeCase c = GetParam();
   const auto grasp = c.grasp;
   c.grasp = [&](Rod& r) {
     grasp(r);
@@ -184,7 +184,7 @@ TEST_P(RodDerivatives, ViscousResponseIsElasticPlusRatioTimesRate)
   EXPECT_LT((gradientFor(1.0, now + 0.5 * (reference - now)) - elastic - 0.5 * once).norm(), 1e-12 * once.norm());
 }
 
-const std::vector<Case> kCases = {
+const std::vector<DerivativeCase> kDerivativeCases = {
     {"open", false, [](Rod&) {}, 0.0},
     {"closed", true, [](Rod&) {}, 0.0},
     {"clamped_ends", false,
@@ -253,7 +253,7 @@ const std::vector<Case> kCases = {
      0.0, Curvature::compensated, true},
     {"compensated_straight_closed", true, [](Rod& r) { r.hold(3, 3); }, 0.0, Curvature::compensated, true},
 };
-INSTANTIATE_TEST_SUITE_P(Kinds, RodDerivatives, ::testing::ValuesIn(kCases),
+INSTANTIATE_TEST_SUITE_P(Kinds, RodDerivatives, ::testing::ValuesIn(kDerivativeCases),
                          [](const auto& info) { return info.param.name; });
 
 }   // namespace

@@ -2,16 +2,14 @@
 // given.
 #include <cstring>
 #include <functional>
-#include <limits>
 
 #include <gtest/gtest.h>
 
 #include "test/support/rods.h"
+#include "test/support/special_numbers.h"
 
 namespace slender::test {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
 
 /// A hanging rope between two grippers, moving, damped: every part of the state is in use.
 Rod movingRod(const TimeConfig& time, int warm_steps = 12)

@@ -11,9 +11,12 @@
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/state_bytes.h"
+#include "test/support/scenes.h"
 
 namespace slender {
 namespace {
+
+using test::runSteps;
 
 const char* const two_rods = R"(
 time: {step: 0.01}
@@ -28,18 +31,9 @@ rods:
     grasps: {b_left: {nodes: [3], hold: position}}
 )";
 
-Simulation make(const std::vector<std::string>& overrides = {})
+Simulation twoRodSimulation(const std::vector<std::string>& overrides = {})
 {
   return Simulation(parseScene(two_rods, "t", overrides));
-}
-
-void run(Simulation& simulation, int steps)
-{
-  for (int k = 0; k < steps; ++k)
-  {
-    const StepReport report = simulation.step(simulation.defaultInputs());
-    ASSERT_TRUE(report.ok) << report.message;
-  }
 }
 
 void expectSameBits(const SceneState& a, const SceneState& b) { EXPECT_TRUE(stateBytes(a) == stateBytes(b)); }
@@ -56,7 +50,7 @@ TEST(StepsUntil, CountsWholeStepsAndHasAnEnd)
 
 TEST(Simulation, buildsWhatTheSceneSays)
 {
-  const Simulation simulation = make();
+  const Simulation simulation = twoRodSimulation();
   ASSERT_EQ(simulation.grasps().size(), 3u);
   EXPECT_EQ(simulation.grasps()[2].rod, 1);
   EXPECT_EQ(simulation.grasps()[2].index, 0);
@@ -68,22 +62,22 @@ TEST(Simulation, buildsWhatTheSceneSays)
 
 TEST(Simulation, dragIsSpreadOverTheNodes)
 {
-  const Simulation simulation = make({"rods.0.damping.drag=0.3"});
+  const Simulation simulation = twoRodSimulation({"rods.0.damping.drag=0.3"});
   EXPECT_NEAR(simulation.rodModel(0).drag.sum(), 0.3, 1e-12);   // 0.3 N s/m^2 times 1 m
   EXPECT_NEAR(simulation.rodModel(0).drag[0], 0.5 * simulation.rodModel(0).drag[1], 1e-15);
 }
 
 TEST(Simulation, timeIsStepsTimesStep)
 {
-  Simulation simulation = make({"gravity=[0, 0, 0]", "rods.0.grasps.right.motion=fixed"});
-  run(simulation, 30);
+  Simulation simulation = twoRodSimulation({"gravity=[0, 0, 0]", "rods.0.grasps.right.motion=fixed"});
+  runSteps(simulation, 30);
   EXPECT_EQ(simulation.state().time, 30 * 0.01);
 }
 
 TEST(Simulation, anInitialAttachmentKeepsItsOffset)
 {
-  Simulation simulation = make();
-  run(simulation, 100);   // the gripper rose by 1 m
+  Simulation simulation = twoRodSimulation();
+  runSteps(simulation, 100);   // the gripper rose by 1 m
   const RodState& rod = simulation.state().rods[0];
   EXPECT_LT((rod.x.col(20) - Eigen::Vector3d(1, 0, 1)).norm(), 1e-12);
   EXPECT_LT((rod.x.col(0) - Eigen::Vector3d(0, 0, 0)).norm(), 1e-12);
@@ -91,7 +85,7 @@ TEST(Simulation, anInitialAttachmentKeepsItsOffset)
 
 TEST(Simulation, offsetsCarryTheVelocityOfTheirLever)
 {
-  Simulation simulation = make();
+  Simulation simulation = twoRodSimulation();
   const double c = std::cos(0.3), s = std::sin(0.3);
   const Pose X_WM{{1, 1, 0}, Eigen::Quaterniond(c, 0, 0, s)};
   simulation.grasps().setOffset(
@@ -106,7 +100,7 @@ TEST(Simulation, offsetsCarryTheVelocityOfTheirLever)
 
 TEST(Simulation, refusesInputsOfTheWrongSize)
 {
-  Simulation simulation = make();
+  Simulation simulation = twoRodSimulation();
   SceneInputs inputs = simulation.defaultInputs();
   inputs.grasps.pop_back();
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
@@ -114,8 +108,8 @@ TEST(Simulation, refusesInputsOfTheWrongSize)
 
 TEST(Simulation, aFailedStepTouchesNothing)
 {
-  Simulation simulation = make();
-  run(simulation, 3);
+  Simulation simulation = twoRodSimulation();
+  runSteps(simulation, 3);
   const SceneState before = simulation.state();
   SceneInputs inputs = simulation.defaultInputs();
   inputs.grasps[1].X_WG.position.x() = std::nan("");
@@ -123,49 +117,49 @@ TEST(Simulation, aFailedStepTouchesNothing)
   EXPECT_FALSE(report.ok);
   EXPECT_NE(report.message.find("rod 'a'"), std::string::npos) << report.message;
   expectSameBits(simulation.state(), before);
-  run(simulation, 1);   // and it goes on
+  runSteps(simulation, 1);   // and it goes on
 }
 
 TEST(Simulation, threadsDoNotChangeResults)
 {
-  Simulation one = make(), many = make();
+  Simulation one = twoRodSimulation(), many = twoRodSimulation();
   one.setThreads(1);
   many.setThreads(2);
-  run(one, 40);
-  run(many, 40);
+  runSteps(one, 40);
+  runSteps(many, 40);
   expectSameBits(one.state(), many.state());
   EXPECT_THROW(one.setThreads(0), std::invalid_argument);
 }
 
 TEST(Simulation, resetStartsAgain)
 {
-  Simulation simulation = make();
+  Simulation simulation = twoRodSimulation();
   const SceneState start = simulation.state();
-  run(simulation, 20);
+  runSteps(simulation, 20);
   const SceneState first = simulation.state();
   simulation.reset();
   expectSameBits(simulation.state(), start);
-  run(simulation, 20);
+  runSteps(simulation, 20);
   expectSameBits(simulation.state(), first);
 }
 
 TEST(Simulation, attachAndRelease)
 {
-  Simulation simulation = make({"rods.0.grasps.right.motion=fixed"});
-  run(simulation, 5);
+  Simulation simulation = twoRodSimulation({"rods.0.grasps.right.motion=fixed"});
+  runSteps(simulation, 5);
   simulation.grasps().release(1);
   EXPECT_EQ(simulation.grasps().wrench(1).force, Eigen::Vector3d(0, 0, 0));
-  run(simulation, 20);
+  runSteps(simulation, 20);
   EXPECT_LT(simulation.state().rods[0].x(2, 20), -0.05);   // the released end falls
   const Eigen::Vector3d caught = simulation.state().rods[0].x.col(10);
   simulation.grasps().attach(1, 10, 12, Hold::frame);
-  run(simulation, 20);
+  runSteps(simulation, 20);
   EXPECT_LT((simulation.state().rods[0].x.col(10) - caught).norm(), 1e-12);
 }
 
 TEST(Simulation, refusesToAttachWhatCannotBeHeld)
 {
-  Simulation simulation = make();
+  Simulation simulation = twoRodSimulation();
   EXPECT_THROW(simulation.grasps().attach(3, 0, 0, Hold::frame), std::invalid_argument);
   EXPECT_THROW(simulation.grasps().attach(-1, 0, 0, Hold::frame), std::invalid_argument);
   EXPECT_THROW(simulation.grasps().attach(1, -1, 0, Hold::frame), std::invalid_argument);
@@ -181,11 +175,11 @@ TEST(Simulation, refusesToAttachWhatCannotBeHeld)
 TEST(Simulation, equilibriumHangsStill)
 {
   Simulation simulation =
-      make({"start=equilibrium", "rods.1.grasps.b_left={edges: [0]}", "rods.0.grasps.right.motion=fixed"});
+      twoRodSimulation({"start=equilibrium", "rods.1.grasps.b_left={edges: [0]}", "rods.0.grasps.right.motion=fixed"});
   const Eigen::Matrix3Xd start = simulation.state().rods[1].x;
   EXPECT_LT(start(2, 30), -0.1);
   EXPECT_NEAR(simulation.grasps().wrench(2).force.z(), -simulation.rodModel(1).totalMass() * 9.81, 1e-6);
-  run(simulation, 10);
+  runSteps(simulation, 10);
   EXPECT_LT((simulation.state().rods[1].x - start).cwiseAbs().maxCoeff(), 1e-6);
 }
 
@@ -231,25 +225,25 @@ TEST_P(SavedState, loadAndStepIsBitEqual)
   const std::vector<std::string> settings{
       std::string("time.integrator=") + GetParam(), "rods.0.damping.stiffness=0.001",
       std::string("time.step=") + (std::string(GetParam()) == "symplectic_euler" ? "1e-5" : "0.01")};
-  Simulation through = make(settings);
-  run(through, 25);
+  Simulation through = twoRodSimulation(settings);
+  runSteps(through, 25);
   through.save(path_);
-  run(through, 25);
+  runSteps(through, 25);
 
-  Simulation again = make(settings);
+  Simulation again = twoRodSimulation(settings);
   again.load(path_);
-  run(again, 25);
+  runSteps(again, 25);
   expectSameBits(again.state(), through.state());
 
-  run(through, 3);
+  runSteps(through, 3);
   through.load(path_);   // back in the same object as well
-  run(through, 25);
+  runSteps(through, 25);
   expectSameBits(again.state(), through.state());
 }
 
 TEST_P(SavedState, refusesWhatDoesNotFit)
 {
-  Simulation simulation = make({std::string("time.integrator=") + GetParam()});
+  Simulation simulation = twoRodSimulation({std::string("time.integrator=") + GetParam()});
   const auto refusal = [&](Simulation& target) {
     const SceneState before = target.state();
     std::string reason;
@@ -291,10 +285,10 @@ TEST_P(SavedState, refusesWhatDoesNotFit)
   for (const char* change : {"rods.0.material.youngs_modulus=2e6", "rods.1.centerline.straight.edges=31",
                              "time.step=0.02", "gravity=[0, 0, -1]", "rods.1.name=c"})
   {
-    Simulation other = make({std::string("time.integrator=") + GetParam(), change});
+    Simulation other = twoRodSimulation({std::string("time.integrator=") + GetParam(), change});
     EXPECT_NE(refusal(other).find("belongs to another scene"), std::string::npos) << change;
   }
-  Simulation same = make({std::string("time.integrator=") + GetParam(), "record.every=7", "name=other"});
+  Simulation same = twoRodSimulation({std::string("time.integrator=") + GetParam(), "record.every=7", "name=other"});
   EXPECT_EQ(refusal(same), "");
 }
 
@@ -324,14 +318,14 @@ TEST(SavedStateFile, restartsRodsWithoutFramesBitEqual)
                    "hold: position}}}]\n"));
   };
   Simulation through = scene(), again = scene();
-  run(through, 25);
+  runSteps(through, 25);
   through.save(path);
   EXPECT_FALSE(through.state().rods[0].framed());
   again.load(path);
   for (Simulation* s : {&through, &again})
   {
     s->grasps().attach(0, 0, 0, Hold::frame);
-    run(*s, 25);
+    runSteps(*s, 25);
     EXPECT_TRUE(s->state().rods[0].framed());
   }
   expectSameBits(again.state(), through.state());
@@ -340,7 +334,7 @@ TEST(SavedStateFile, restartsRodsWithoutFramesBitEqual)
 
 TEST(SavedStateFile, sayWhyItCannotBeWritten)
 {
-  const Simulation simulation = make();
+  const Simulation simulation = twoRodSimulation();
   try
   {
     simulation.save("/nonexistent/folder/state");
@@ -387,17 +381,17 @@ time: {step: 0.01}
 bodies: [{name: hand, pose: {position: [1, 0, 0]}, motion: {topic: true}}]
 rods: [{centerline: {straight: {edges: 20}}, grasps: {left: {edges: [0]}, right: {edges: [-1], motion: )" +
                                      motion + "}}}]\n"));
-    run(simulation, 2);
+    runSteps(simulation, 2);
     EXPECT_EQ(simulation.state().rods[0].x(0, 20), 1.0);
     simulation.grasps().release(1);
-    run(simulation, 20);
+    runSteps(simulation, 20);
     const Eigen::Matrix3Xd fallen = simulation.state().rods[0].x;
     ASSERT_LT(fallen(2, 10), -0.05);
     simulation.grasps().attach(1, 10, 10, Hold::frame);
-    run(simulation, 10);
+    runSteps(simulation, 10);
     EXPECT_LT((simulation.state().rods[0].x.col(10) - fallen.col(10)).norm(), 1e-12) << motion;
     simulation.reset();
-    run(simulation, 2);
+    runSteps(simulation, 2);
     EXPECT_EQ(simulation.state().rods[0].x(0, 20), 1.0);   // the section itself again
   }
 }
@@ -465,12 +459,12 @@ rods: [{centerline: {straight: {edges: 20}}, material: {bend_modulus: 1e-4, twis
 
   // and a projected run holds its lengths, also after saving and loading
   Simulation a = build({"rods.0.stretching=projected"}), b = build({"rods.0.stretching=projected"});
-  run(a, 50);
+  runSteps(a, 50);
   const std::string file = ::testing::TempDir() + "projected_state";
   a.save(file);
   b.load(file);
-  run(a, 20);
-  run(b, 20);
+  runSteps(a, 20);
+  runSteps(b, 20);
   expectSameBits(a.state(), b.state());
   Simulation stiff = build({}), general = build({"rods.0.stretching=projected", "rods.0.formulation=general"});
   EXPECT_THROW(stiff.load(file), std::runtime_error);   // other equations: not the same run going on

@@ -56,7 +56,7 @@ SubstepRule rule(double longest, int max_cuts = 10)
   return r;
 }
 
-StepReport run(Scripted& equations, const SubstepRule& r, double duration)
+StepReport runScripted(Scripted& equations, const SubstepRule& r, double duration)
 {
   StepReport report;
   SubstepController(r).run(equations, duration, report);
@@ -79,7 +79,7 @@ void expectSeamless(const Scripted& equations, double duration)
 TEST(SubstepController, aStepThatSucceedsIsOneSubstep)
 {
   Scripted equations;
-  const StepReport report = run(equations, rule(0.01), 0.01);
+  const StepReport report = runScripted(equations, rule(0.01), 0.01);
   EXPECT_TRUE(report.ok);
   EXPECT_EQ(report.substeps, 1);
   EXPECT_EQ(report.cut_steps, 0);
@@ -92,7 +92,7 @@ TEST(SubstepController, halvesWhatFailsAndLengthensAgain)
   Scripted equations;
   equations.solvable = 0.3;
   equations.hard_until = 0.5;
-  const StepReport report = run(equations, rule(1.0), 1.0);
+  const StepReport report = runScripted(equations, rule(1.0), 1.0);
   EXPECT_TRUE(report.ok);
   expectSeamless(equations, 1.0);
   // 1 and 1/2 fail; 1/4 succeeds; 1/2 is tried and fails; 1/4 ends at 1/2, after which 1/2 succeeds.
@@ -109,7 +109,7 @@ TEST(SubstepController, neverHalvesBelowTheDepthOfMaxCuts)
   {
     Scripted equations;
     equations.solvable = 0.0;
-    const StepReport report = run(equations, rule(1.0, cuts), 1.0);
+    const StepReport report = runScripted(equations, rule(1.0, cuts), 1.0);
     EXPECT_FALSE(report.ok);
     EXPECT_EQ(report.failure, StepFailure::newton_diverged);
     EXPECT_EQ(report.cut_steps, cuts);
@@ -125,7 +125,7 @@ TEST(SubstepController, neverHalvesBelowTheShortestLength)
   equations.solvable = 0.0;
   SubstepRule r = rule(1.0);
   r.min_step = 0.2;
-  run(equations, r, 1.0);
+  runScripted(equations, r, 1.0);
   EXPECT_EQ(equations.refused_length, 0.25);
 }
 
@@ -134,7 +134,7 @@ TEST(SubstepController, endsAtOnceWhereNoShorterSubstepHelps)
   Scripted equations;
   equations.solvable = 0.0;
   equations.helpless = true;
-  const StepReport report = run(equations, rule(1.0), 1.0);
+  const StepReport report = runScripted(equations, rule(1.0), 1.0);
   EXPECT_FALSE(report.ok);
   EXPECT_EQ(equations.tried.size(), 1u);
   EXPECT_EQ(report.cut_steps, 0);
@@ -145,7 +145,7 @@ TEST(SubstepController, mendsWhenTheShortestSubstepHasFailed)
   Scripted equations;
   equations.solvable = 0.0;
   equations.mends = 1;
-  const StepReport report = run(equations, rule(1.0, 2), 1.0);
+  const StepReport report = runScripted(equations, rule(1.0, 2), 1.0);
   EXPECT_TRUE(report.ok);
   EXPECT_EQ(report.mended_folds, 1);
   EXPECT_EQ(report.cut_steps, 2);
@@ -155,7 +155,7 @@ TEST(SubstepController, mendsWhenTheShortestSubstepHasFailed)
 TEST(SubstepController, dividesIntoEqualSubstepsAtMostAsLongAsAskedFor)
 {
   Scripted equations;
-  const StepReport report = run(equations, rule(0.25), 1.0);
+  const StepReport report = runScripted(equations, rule(0.25), 1.0);
   EXPECT_EQ(report.substeps, 4);
   expectSeamless(equations, 1.0);
   for (const Substep& s : equations.accepted)
@@ -191,7 +191,7 @@ TEST(SubstepController, anInterruptedStepIsRefused)
 {
   Scripted equations;
   interruptSteps();
-  const StepReport report = run(equations, rule(1.0), 1.0);
+  const StepReport report = runScripted(equations, rule(1.0), 1.0);
   allowSteps();
   EXPECT_FALSE(report.ok);
   EXPECT_EQ(report.failure, StepFailure::interrupted);

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// Straight along x at `at`, from -length/2 to length/2.
-ThreadState straight(double length, int edges, double radius, const Vector3d& at)
+ThreadState straightThread(double length, int edges, double radius, const Vector3d& at)
 {
   Eigen::Matrix3Xd x(3, edges + 1);
   for (int i = 0; i <= edges; ++i)
@@ -122,10 +122,10 @@ TEST(Merging, GradientAndStiffnessMatchDifferences)
 }
 
 /// Two parallel threads just in touch; distance of their axes over time.
-struct Pair : ThreadWorld
+struct TouchingThreads : ThreadWorld
 {
   double r = 1e-3;
-  Pair(double merging, double friction, double step) : ThreadWorld(1e-5, step)
+  TouchingThreads(double merging, double friction, double step) : ThreadWorld(1e-5, step)
   {
     ThreadModel m = syrup();
     m.density = 1;
@@ -133,7 +133,7 @@ struct Pair : ThreadWorld
     ContactProperties contact;
     contact.friction = friction;
     for (int k = 0; k < 2; ++k)
-      add(m, straight(0.02, 20, r, {0, 0, (2 * k - 1) * r}), weightless(), contact, merging);
+      add(m, straightThread(0.02, 20, r, {0, 0, (2 * k - 1) * r}), weightless(), contact, merging);
   }
   double distance() const { return (state.threads[1].threads[0].x[10] - state.threads[0].threads[0].x[10]).norm(); }
 };
@@ -165,7 +165,7 @@ TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
   for (int fine = 0; fine < 2; ++fine)
   {
     const double h = fine ? 5e-4 : 1e-3;
-    Pair pair(0.4, 0.3, h);
+    TouchingThreads pair(0.4, 0.3, h);
     World threads(pair.model, pair.state);
     const double volume = pair.state.threads[0].volumeBalance();
     for (int k = 0; k < std::lround(end / h); ++k)
@@ -185,7 +185,7 @@ TEST(TouchingThreads, ParallelThreadsMergeAtTheRateOfTheModel)
 
 TEST(TouchingThreads, MergedThreadsStayAtTheDistanceAskedFor)
 {
-  Pair pair(0.6, 0.3, 2e-3);
+  TouchingThreads pair(0.6, 0.3, 2e-3);
   World threads(pair.model, pair.state);
   for (int k = 0; k < 80; ++k)
   {
@@ -269,7 +269,7 @@ double closest(const WorldState& state)
 /// steps to follow, so it may lag behind by a part of the gap.
 TEST(TouchingThreads, MergedThreadsOfUnequalRadiiStayAtTheDistanceAskedFor)
 {
-  Pair pair(0.6, 0.3, 2e-3);
+  TouchingThreads pair(0.6, 0.3, 2e-3);
   for (ThreadGroupState& group : pair.state.threads)
     for (const int j : {0, 19})
       group.threads[0].volume[j] *= 0.98;
@@ -343,7 +343,7 @@ TEST(TouchingThreads, ContactConservesMomentum)
   ThreadModel m = syrup();
   for (int k = 0; k < 2; ++k)
   {
-    ThreadState s = straight(0.03, 15, 1e-3, {0, 0, (2 * k - 1) * 1.5e-3});
+    ThreadState s = straightThread(0.03, 15, 1e-3, {0, 0, (2 * k - 1) * 1.5e-3});
     if (k)
       for (auto& x : s.x)
         x = Vector3d(x.y() + 1e-3, x.x(), x.z());
@@ -377,7 +377,7 @@ TEST(TouchingThreads, AThreadSagsOverAMovingObstacle)
   ThreadModel m = syrup();
   m.viscosity = 1000;
   ThreadInputs in;
-  over.add(m, straight(0.1, 40, 1.5e-3, {0, 0, 0.0137}), in);
+  over.add(m, straightThread(0.1, 40, 1.5e-3, {0, 0, 0.0137}), in);
   over.addObstacle(Sphere{0.012}, Pose{}, 0.5);
   World threads(over.model, over.state);
   double least = 1e9;
@@ -411,7 +411,7 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     const Vector3d normal(0, -std::sin(tilt), std::cos(tilt)), down(0, -std::cos(tilt), -std::sin(tilt));
     ContactProperties touch;
     touch.friction = 1.0;
-    slope.add(m, straight(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
+    slope.add(m, straightThread(0.02, 10, 1e-3, 1.01e-3 * normal), ThreadInputs{}, touch);
     slope.addObstacle(Plane{}, {Vector3d::Zero(), rotationBetween(Vector3d::UnitZ(), normal)}, friction * friction);
     World threads(slope.model, slope.state);
     for (int k = 0; k < 200; ++k)
@@ -433,7 +433,7 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
   in.belt_velocity << 0.0, 0.5, 0.0;
   ContactProperties touch;
   touch.friction = 0.25;
-  belt.add(m, straight(0.02, 10, 1e-3, {0, 0, 1.01e-3}), in, touch);
+  belt.add(m, straightThread(0.02, 10, 1e-3, {0, 0, 1.01e-3}), in, touch);
   World threads(belt.model, belt.state);
   for (int k = 1; k <= 400; ++k)
   {
@@ -451,10 +451,10 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
 TEST(TouchingThreads, RefusesWhatDoesNotFit)
 {
   ThreadWorld bad(1e-4, 1e-3);
-  bad.add(syrup(), straight(0.02, 4, 1e-3, Vector3d::Zero()), weightless(), {}, 1.0);
+  bad.add(syrup(), straightThread(0.02, 4, 1e-3, Vector3d::Zero()), weightless(), {}, 1.0);
   EXPECT_THROW(World(bad.model, bad.state), WorldError);
   bad.model.threads[0].merging = 0.0;
-  bad.add(syrup(), straight(0.02, 4, 1e-3, {0, 0, 1.9e-3}), weightless());
+  bad.add(syrup(), straightThread(0.02, 4, 1e-3, {0, 0, 1.9e-3}), weightless());
   EXPECT_THROW(World(bad.model, bad.state), WorldError);   // they overlap
   for (Vector3d& x : bad.state.threads[1].threads[0].x)
     x.z() = 2.5e-3;

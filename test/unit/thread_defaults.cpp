@@ -9,6 +9,7 @@
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/thread/thread_flow.h"
 #include "slender_sim/thread/thread_group.h"
+#include "test/support/scenes.h"
 #include "test/support/threads.h"
 
 namespace slender::test {
@@ -24,20 +25,7 @@ threads:
     floor: {height: 0}
 )";
 
-std::string problemsOf(const std::string& scene, const std::vector<std::string>& overrides)
-{
-  try
-  {
-    parseScene(scene, "t", overrides);
-  }
-  catch (const SceneError& error)
-  {
-    return error.what();
-  }
-  return "";
-}
-
-std::string warningsOf(const std::string& scene, const std::vector<std::string>& overrides = {})
+std::string joinedWarningsOf(const std::string& scene, const std::vector<std::string>& overrides = {})
 {
   std::string all;
   for (const std::string& warning : parseScene(scene, "t", overrides).warnings)
@@ -263,20 +251,21 @@ TEST(ThreadDefaults, ANozzleThatRisesGetsTheFinestOfAllItsHeights)
 
 TEST(ThreadDefaults, WhatIsTooCoarseForTheCoilIsSaid)
 {
-  const std::string coarse = warningsOf(plain, {"threads.0.edges={feed: 0.005, longest: 0.01}"});
+  const std::string coarse = joinedWarningsOf(plain, {"threads.0.edges={feed: 0.005, longest: 0.01}"});
   EXPECT_TRUE(contains(coarse, "threads.0.edges.longest = 0.01: coils of a radius of about")) << coarse;
   EXPECT_TRUE(contains(coarse, "Use edges.longest: 0.0006")) << coarse;
-  const std::string slow = warningsOf(plain, {"threads.0.edges={longest: 0.0006}", "time.step=0.01"});
+  const std::string slow = joinedWarningsOf(plain, {"threads.0.edges={longest: 0.0006}", "time.step=0.01"});
   EXPECT_TRUE(contains(slow, "rad/s")) << slow;
-  EXPECT_EQ(warningsOf(plain, {"threads.0.edges={longest: 0.0006}", "time.step=0.001"}), "");
+  EXPECT_EQ(joinedWarningsOf(plain, {"threads.0.edges={longest: 0.0006}", "time.step=0.001"}), "");
 }
 
 TEST(ThreadDefaults, WhatIsNoThreadIsSaid)
 {
-  EXPECT_TRUE(contains(warningsOf(plain, {"threads.0.fluid.viscosity=0.001", "threads.0.fluid.surface_tension=0"}),
-                       "which is no thread"));
   EXPECT_TRUE(
-      contains(warningsOf(plain, {"threads.0.nozzle.position=[0, 0, 0.008]"}), "less than two of its diameters"));
+      contains(joinedWarningsOf(plain, {"threads.0.fluid.viscosity=0.001", "threads.0.fluid.surface_tension=0"}),
+               "which is no thread"));
+  EXPECT_TRUE(
+      contains(joinedWarningsOf(plain, {"threads.0.nozzle.position=[0, 0, 0.008]"}), "less than two of its diameters"));
   for (const char* height : {"0.002", "0", "-0.01"})
     EXPECT_TRUE(contains(problemsOf(plain, {std::string("threads.0.nozzle.position=[0, 0, ") + height + "]"}),
                          "must be more than its radius 2.5 mm"))
@@ -295,7 +284,7 @@ threads:
   - nozzle: {position: [0, 0, 0.07], diameter: 0.005}
     floor: {height: 0}
 )";
-  const std::string all = warningsOf(text);
+  const std::string all = joinedWarningsOf(text);
   EXPECT_TRUE(contains(all, "threads.0.fluid: is absent")) << all;
   EXPECT_TRUE(contains(all, "threads.0.nozzle.flow: is absent, so nothing flows")) << all;
 }
@@ -304,10 +293,11 @@ TEST(ThreadDefaults, WhatThreadsIgnoreIsRefusedOrSaid)
 {
   EXPECT_TRUE(
       contains(problemsOf(plain, {"time.error_tolerance=1e-5"}), "time.error_tolerance = 1e-5: is not for threads"));
-  EXPECT_TRUE(contains(warningsOf(plain, {"wind={velocity: [1, 0, 0]}"}), "does not act on threads"));
+  EXPECT_TRUE(contains(joinedWarningsOf(plain, {"wind={velocity: [1, 0, 0]}"}), "does not act on threads"));
   const std::string mixed = std::string(plain) + "rods: [{grasps: {left: {edges: [0]}}}]\n";
   EXPECT_EQ(problemsOf(mixed, {"time.error_tolerance=1e-5", "time.integrator=bdf2", "start=equilibrium"}), "");
-  const std::string all = warningsOf(mixed, {"time.error_tolerance=1e-5", "time.integrator=bdf2", "start=equilibrium"});
+  const std::string all =
+      joinedWarningsOf(mixed, {"time.error_tolerance=1e-5", "time.integrator=bdf2", "start=equilibrium"});
   EXPECT_TRUE(contains(all, "whose steps are of fixed length")) << all;
   EXPECT_TRUE(contains(all, "which take implicit Euler steps")) << all;
   EXPECT_TRUE(contains(all, "they start as given")) << all;

@@ -28,7 +28,7 @@ Thread piece(const std::vector<double>& radii, const std::vector<double>& length
 }
 
 /// Of the motion and of the surface [J]. A straight piece does not spin.
-double energyOf(const Thread& t)
+double threadEnergy(const Thread& t)
 {
   double energy = t.model.surface_tension * surfaceArea(t.state);
   for (int j = 0; j < t.state.edges(); ++j)
@@ -56,12 +56,12 @@ TEST(ThreadDrops, AnEdgeBecomesADropAndStays)
   {
     Thread t = piece({std::sqrt(volume / (M_PI * length))}, {length}, 0.1);
     ThreadStepper stepper = t.stepper();
-    double energy = energyOf(t);
+    double energy = threadEnergy(t);
     for (int k = 0; k < 600; ++k)
     {
       const StepReport report = stepper.step(t.state, t.inputs, 2e-4);
       ASSERT_TRUE(report.ok) << length << " step " << k << ": " << report.message;
-      const double now = energyOf(t);
+      const double now = threadEnergy(t);
       EXPECT_LE(now, energy * (1 + 1e-9)) << length << " step " << k;   // the tolerance is that of Newton's method
       energy = now;
     }
@@ -86,12 +86,12 @@ TEST(ThreadDrops, TheEnergyOfFreePiecesDoesNotGrow)
     {
       Thread t = piece(c.radii, c.lengths, 1e-3);
       ThreadStepper stepper = t.stepper();
-      double energy = energyOf(t);
+      double energy = threadEnergy(t);
       for (int k = 0; k < 400; ++k)
       {
         const StepReport report = stepper.step(t.state, t.inputs, step);
         ASSERT_TRUE(report.ok) << "step " << k << ": " << report.message;
-        const double now = energyOf(t);
+        const double now = threadEnergy(t);
         EXPECT_LE(now, energy * (1 + 1e-9)) << c.radii.size() << " edges, step " << step << ", " << k;
         energy = now;
       }

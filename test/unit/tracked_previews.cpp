@@ -31,7 +31,7 @@ std::string previewed(const std::string& contact = "", const std::string& more =
          traits + "tracked:\n  - name: fine\n    guide: {cloth: coarse}\n    mesh: {subdivide: 2}\n" + traits + more;
 }
 
-const char* const kBall =
+const char* const kObstacleBall =
     "obstacles: [{name: ball, shape: {sphere: {radius: 0.1}}, pose: {position: [0.25, 0.25, 0.15]}}]\n";
 
 class TrackedPreviews : public testing::Test
@@ -64,14 +64,14 @@ TEST_F(TrackedPreviews, FollowTheClothOfTheSameInstant)
 {
   for (const bool contact : {false, true})
   {
-    const std::string text = contact ? previewed("{thickness: 0.004, cloths: true}", kBall) : previewed();
+    const std::string text = contact ? previewed("{thickness: 0.004, cloths: true}", kObstacleBall) : previewed();
     Simulation simulation(parseScene(text, "t"));
     const SceneState& state = simulation.state();
     ASSERT_EQ(state.cloths[1].x.cols(), 81);
     EXPECT_FALSE(simulation.config().cloths[1].tracking->guide.byTopic());
     EXPECT_TRUE(state.cloth_guides[1].points == state.cloths[0].x);
     // the preview is as it is alone: what tracks it does not touch it
-    const std::string alone_text = text.substr(0, text.find("tracked:")) + (contact ? kBall : "");
+    const std::string alone_text = text.substr(0, text.find("tracked:")) + (contact ? kObstacleBall : "");
     Simulation alone(parseScene(alone_text, "t"));
     for (int k = 0; k < 60; ++k)
     {
@@ -90,7 +90,7 @@ TEST_F(TrackedPreviews, FollowTheClothOfTheSameInstant)
 
 TEST_F(TrackedPreviews, RestartExactly)
 {
-  const std::string text = previewed("{thickness: 0.004}", kBall);
+  const std::string text = previewed("{thickness: 0.004}", kObstacleBall);
   Simulation one(parseScene(text, "t")), two(parseScene(text, "t"));
   for (int k = 0; k < 25; ++k)
     ASSERT_TRUE(one.step(one.defaultInputs()).ok);

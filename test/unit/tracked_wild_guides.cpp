@@ -13,7 +13,7 @@ namespace {
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
-const char* const kSheet = R"(
+const char* const kGuidedSheet = R"(
 name: sheet
 time: {step: 0.01, duration: 1}
 tracked:
@@ -48,7 +48,7 @@ protected:
     return x;
   }
 
-  Simulation simulation{parseScene(kSheet, "sheet.yaml", {})};
+  Simulation simulation{parseScene(kGuidedSheet, "sheet.yaml", {})};
   const Matrix3Xd rest = simulation.config().cloths[0].tracking->guide.mesh.vertices;
   const ClothState& cloth = simulation.state().cloths[0];
   const long most = WorkBudget::ofStep(cloth.x.cols());
@@ -91,7 +91,7 @@ TEST_F(WildGuides, AreRefusedWithinTheBudgetAndTheRunGoesOn)
   EXPECT_LT(simulation.trackingError(0).met, 1e-9);
 
   // steps that were refused leave nothing behind
-  Simulation calm(parseScene(kSheet, "sheet.yaml", {}));
+  Simulation calm(parseScene(kGuidedSheet, "sheet.yaml", {}));
   for (int k = 0; k < 8; ++k)
     ASSERT_TRUE(calm.step(calm.defaultInputs()).ok);
   EXPECT_TRUE(calm.state().cloths[0].x == cloth.x && calm.state().cloths[0].v == cloth.v);

@@ -40,7 +40,7 @@ void expectWatertight(const TriangleMesh& mesh)
 /// Of a polygon with as many sides as the tube, over that of the ellipse around it.
 double polygonShare(int sides) { return sides / (2 * M_PI) * std::sin(2 * M_PI / sides); }
 
-FramedLine straight(int edges, double length, double a, double b)
+FramedLine straightLine(int edges, double length, double a, double b)
 {
   FramedLine line{false, Eigen::Matrix3Xd::Zero(3, edges + 1), Eigen::Matrix3Xd::Zero(3, edges),
                   Eigen::Matrix2Xd(2, edges)};
@@ -53,7 +53,7 @@ FramedLine straight(int edges, double length, double a, double b)
 
 TEST(TubeMesh, ellipticTubeHasItsVolumeAndAxesAlongTheFrame)
 {
-  const TriangleMesh mesh = tubeMesh(tubeSections(straight(7, 2.0, 0.3, 0.1), 100), 16, false);
+  const TriangleMesh mesh = tubeMesh(tubeSections(straightLine(7, 2.0, 0.3, 0.1), 100), 16, false);
   expectWatertight(mesh);
   EXPECT_NEAR(volumeOf(mesh), M_PI * 0.3 * 0.1 * 2.0 * polygonShare(16), 1e-12);
   // d1 is y, and points at a side's middle
@@ -88,7 +88,7 @@ TEST(TubeMesh, closedTubeIsATorusAlsoWithTurningFrames)
 
 TEST(TubeMesh, radiiAreAveragedAtNodesAndSectionsPassThroughThem)
 {
-  FramedLine line = straight(2, 1.0, 0.1, 0.1);
+  FramedLine line = straightLine(2, 1.0, 0.1, 0.1);
   line.semi_axes.col(1).setConstant(0.3);
   const std::vector<TubeSection> sections = tubeSections(line, 2);
   ASSERT_EQ(sections.size(), 3u);

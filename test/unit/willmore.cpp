@@ -1,5 +1,4 @@
 #include <cmath>
-#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -7,11 +6,10 @@
 #include "slender_sim/fairing/willmore_flow.h"
 #include "slender_sim/geometry/mesh_defects.h"
 #include "test/support/cloths.h"
+#include "test/support/special_numbers.h"
 
 namespace slender::test {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TriangleMesh roughSphere(int levels, double size, unsigned seed)
 {
@@ -39,9 +37,9 @@ std::vector<char> innerVertices(const TriangleMesh& mesh)
   return inner;
 }
 
-double energyOf(WillmoreEnergy& energy, const Matrix3Xd& x) { return energy.energy(pointsOf(x).data()); }
+double willmoreEnergy(WillmoreEnergy& energy, const Matrix3Xd& x) { return energy.energy(pointsOf(x).data()); }
 
-Matrix3Xd gradientOf(WillmoreEnergy& energy, const Matrix3Xd& x)
+Matrix3Xd willmoreGradient(WillmoreEnergy& energy, const Matrix3Xd& x)
 {
   PointVector g(4 * x.cols(), 0.0);
   energy.addGradient(pointsOf(x).data(), g.data());
@@ -83,8 +81,8 @@ TEST(WillmoreEnergy, GradientIsTheDerivative)
   {
     WillmoreEnergy energy(mesh.triangles, innerVertices(mesh));
     const MatrixXd expected = differences(
-        mesh.vertices, 1e-4, [&](const Matrix3Xd& x) { return VectorXd::Constant(1, energyOf(energy, x)); });
-    const Matrix3Xd gradient = gradientOf(energy, mesh.vertices);
+        mesh.vertices, 1e-4, [&](const Matrix3Xd& x) { return VectorXd::Constant(1, willmoreEnergy(energy, x)); });
+    const Matrix3Xd gradient = willmoreGradient(energy, mesh.vertices);
     // fourth order: (1e-4 / edge)^4, round-off 1e-16 E / 1e-4
     EXPECT_LT((flattened(gradient) - expected.col(0)).norm(), 1e-8 * expected.norm());
   }
@@ -95,10 +93,10 @@ TEST(WillmoreEnergy, MotionsAndScalingDoNotChangeIt)
   const TriangleMesh mesh = roughSphere(2, 0.1, 3);
   WillmoreEnergy energy(mesh.triangles, innerVertices(mesh));
   Random random(4);
-  const double expected = energyOf(energy, mesh.vertices);
+  const double expected = willmoreEnergy(energy, mesh.vertices);
   const Matrix3Xd moved = (7.0 * random.rotation().toRotationMatrix() * mesh.vertices).colwise() + random.vector(3.0);
-  EXPECT_NEAR(energyOf(energy, moved), expected, 1e-11 * expected);
-  const Matrix3Xd g = gradientOf(energy, mesh.vertices);
+  EXPECT_NEAR(willmoreEnergy(energy, moved), expected, 1e-11 * expected);
+  const Matrix3Xd g = willmoreGradient(energy, mesh.vertices);
   Vector3d torque = Vector3d::Zero();
   for (Eigen::Index v = 0; v < g.cols(); ++v)
     torque += Vector3d(mesh.vertices.col(v)).cross(Vector3d(g.col(v)));
@@ -111,8 +109,8 @@ TEST(WillmoreEnergy, PlanesHaveNone)
 {
   const TriangleMesh mesh = gridMesh(1, 1, 6, 6, GridPattern::irregular, 5);
   WillmoreEnergy energy(mesh.triangles, innerVertices(mesh));
-  EXPECT_LT(energyOf(energy, mesh.vertices), 1e-25);   // squares of round-off over edges
-  EXPECT_LT(gradientOf(energy, mesh.vertices).norm(), 1e-10);
+  EXPECT_LT(willmoreEnergy(energy, mesh.vertices), 1e-25);   // squares of round-off over edges
+  EXPECT_LT(willmoreGradient(energy, mesh.vertices).norm(), 1e-10);
 }
 
 TEST(WillmoreEnergy, IsInfiniteWithoutAreaAndAddsNothing)
@@ -121,10 +119,10 @@ TEST(WillmoreEnergy, IsInfiniteWithoutAreaAndAddsNothing)
   WillmoreEnergy energy(mesh.triangles, innerVertices(mesh));
   mesh.vertices.col(mesh.triangles(0, 0)) =
       0.5 * (mesh.vertices.col(mesh.triangles(1, 0)) + mesh.vertices.col(mesh.triangles(2, 0)));
-  EXPECT_EQ(energyOf(energy, mesh.vertices), kInfinity);
-  EXPECT_EQ(gradientOf(energy, mesh.vertices).norm(), 0.0);
+  EXPECT_EQ(willmoreEnergy(energy, mesh.vertices), kInfinity);
+  EXPECT_EQ(willmoreGradient(energy, mesh.vertices).norm(), 0.0);
   mesh.vertices(0, 3) = std::nan("");
-  EXPECT_EQ(energyOf(energy, mesh.vertices), kInfinity);
+  EXPECT_EQ(willmoreEnergy(energy, mesh.vertices), kInfinity);
 }
 
 TEST(WillmoreEnergy, RefusesFacesWithoutVertices)

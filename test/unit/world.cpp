@@ -15,13 +15,13 @@
 namespace slender::test {
 namespace {
 
-constexpr double kStep = 0.005;   // [s]
+constexpr double kWorldStep = 0.005;   // [s]
 
 /// A rod that is held at one end and, unless `alone`, a cloth that falls beside it.
 WorldModel model(const Rod& rod, bool alone)
 {
   WorldModel world;
-  world.time.step = kStep;
+  world.time.step = kWorldStep;
   world.rods.push_back({rod.model, std::nullopt, {}});
   if (!alone)
   {
@@ -59,11 +59,11 @@ TEST(World, ARodOnItsOwnMovesAsWithoutAWorld)
   rod.hold(0, 1);
   Course alone(rod, true), beside(rod, false);
   TimeConfig time;
-  time.step = kStep;
+  time.step = kWorldStep;
   RodStepper stepper(rod.model, time);
   for (int k = 0; k < 10; ++k)
   {
-    ASSERT_TRUE(stepper.step(rod.state, rod.inputs, kStep).ok);
+    ASSERT_TRUE(stepper.step(rod.state, rod.inputs, kWorldStep).ok);
     for (Course* run : {&alone, &beside})
     {
       ASSERT_TRUE(run->world.step(run->state, run->inputs).ok);
@@ -72,7 +72,7 @@ TEST(World, ARodOnItsOwnMovesAsWithoutAWorld)
     }
   }
   EXPECT_EQ(alone.state.steps, 10u);
-  EXPECT_DOUBLE_EQ(alone.state.time, 10 * kStep);
+  EXPECT_DOUBLE_EQ(alone.state.time, 10 * kWorldStep);
   EXPECT_LT(beside.state.cloths[0].x.row(2).maxCoeff(), -1e-3);   // it falls
 }
 
@@ -97,7 +97,7 @@ TEST(World, NamesThePartThatIsNotValid)
 }
 
 /// A thread and a cloth are stepped before the rods, and rods with contact after those without.
-constexpr const char* kMixed = R"(
+constexpr const char* kManyKinds = R"(
 time: {step: 0.005}
 rods:
   - {name: a, centerline: {straight: {to: [1, 0, 0], edges: 10}}, grasps: {left: {edges: [0]}}}
@@ -111,7 +111,7 @@ TEST(World, AFailureInOneIslandLeavesAllAsTheyWere)
 {
   for (const int failing : {1, 2})
   {
-    Simulation simulation(parseScene(kMixed));
+    Simulation simulation(parseScene(kManyKinds));
     for (int k = 0; k < 3; ++k)
       ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
     const std::string before = stateBytes(simulation.state());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <string>
@@ -67,6 +68,21 @@ inline int nearestVertex(const TriangleMesh& mesh, const Eigen::Vector3d& place)
   Eigen::Index index;
   (mesh.vertices.colwise() - place).colwise().squaredNorm().minCoeff(&index);
   return static_cast<int>(index);
+}
+
+/// Root mean square of the distances of points [m].
+inline double rmsDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b)
+{
+  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
+}
+
+/// Root mean square of the distances of the same points in several frames, which count alike [m].
+inline double rmsDistance(const std::vector<Eigen::Matrix3Xd>& a, const std::vector<Eigen::Matrix3Xd>& b)
+{
+  double sum = 0;
+  for (std::size_t k = 0; k < a.size(); ++k)
+    sum += (a[k] - b[k]).squaredNorm() / static_cast<double>(a[k].cols());
+  return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
 /// Least CPU time [s] of several calls, for as long as `budget` [s] allows, at least three.

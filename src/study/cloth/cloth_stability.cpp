@@ -20,8 +20,8 @@ bool isFinite(const ClothState& s) { return s.x.allFinite() && s.v.allFinite() &
 /// Runs up to `steps` steps of h; `motion` sets the inputs for the end of each. `keeps_energy`: beyond what there is to
 /// give (deformation, and the fall through the sheet's size) none may appear; not asked of what is moved or of explicit
 /// steps, which are bounded by refusal.
-StabilityCell run(ClothSetup& cloth, const ClothOptions& options, double h, int steps,
-                  const std::function<void(int, ClothInputs&)>& motion, bool keeps_energy = true)
+StabilityCell runCloth(ClothSetup& cloth, const ClothOptions& options, double h, int steps,
+                       const std::function<void(int, ClothInputs&)>& motion, bool keeps_energy = true)
 {
   StabilityCell cell;
   cell.linear_steps = options.one_newton_step || options.integrator == Integrator::symplectic_euler;
@@ -126,7 +126,7 @@ void runClothStability(StudyContext& context)
           options.one_newton_step = !newton;
           char what[80];
           std::snprintf(what, sizeof what, "membrane 1e%d N/m, %s", decade, newton ? "Newton" : "one step");
-          report(what, cloth, h, run(cloth, options, h, context.quick() ? 5 : 20, nullptr), false);
+          report(what, cloth, h, runCloth(cloth, options, h, context.quick() ? 5 : 20, nullptr), false);
         }
   for (const BendingModel bending : models)
     for (int decade = -8; decade <= 2; decade += 5)
@@ -135,7 +135,7 @@ void runClothStability(StudyContext& context)
       hung(cloth);
       char what[80];
       std::snprintf(what, sizeof what, "bending 1e%d N m", decade);
-      report(what, cloth, 0.1, run(cloth, common, 0.1, 20, nullptr), false);
+      report(what, cloth, 0.1, runCloth(cloth, common, 0.1, 20, nullptr), false);
     }
 
   const int settling = context.quick() ? 20 : 60;
@@ -151,51 +151,51 @@ void runClothStability(StudyContext& context)
           if (std::find(cloth.state.pins.begin(), cloth.state.pins.end(), static_cast<int>(i)) ==
               cloth.state.pins.end())
             cloth.state.x.col(i) = 0.25 * Eigen::Vector3d(1 + uniform(random), 1 + uniform(random), uniform(random));
-        report("random positions", cloth, h, run(cloth, common, h, settling, nullptr), true);
+        report("random positions", cloth, h, runCloth(cloth, common, h, settling, nullptr), true);
       }
       {   // mirrored: all faces turned over inside their plane
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         cloth.pin({0});
         cloth.state.x.row(0) *= -1.0;
-        report("mirrored", cloth, h, run(cloth, common, h, settling, nullptr), true);
+        report("mirrored", cloth, h, runCloth(cloth, common, h, settling, nullptr), true);
       }
       {   // single vertices across the opposite edge: inverted triangles
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth);
         for (int i = side + 4; i < side * cells; i += side)
           cloth.state.x.col(i) += Eigen::Vector3d(0.1, 0.07, 0);
-        report("inverted triangles", cloth, h, run(cloth, common, h, settling, nullptr), true);
+        report("inverted triangles", cloth, h, runCloth(cloth, common, h, settling, nullptr), true);
       }
       {   // all vertices on one line, and in one point
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         cloth.state.x.row(1).setZero();
-        report("crushed to a line", cloth, h, run(cloth, common, h, settling, nullptr), false);
+        report("crushed to a line", cloth, h, runCloth(cloth, common, h, settling, nullptr), false);
         ClothSetup point = sheet(grid, bending, 1e3, 1e-4);
         point.state.x.setZero();
-        report("crushed to a point", point, h, run(point, common, h, settling, nullptr), false);
+        report("crushed to a point", point, h, runCloth(point, common, h, settling, nullptr), false);
       }
       {
         ClothSetup cloth = sheet(needleMesh(), bending, 1e3, 1e-4);
         if (bending != BendingModel::hinge)   // some of its faces are folded over at rest
           cloth.model->undeformed = gridMesh(0.5, 0.5, 10, 10, GridPattern::alternating).vertices;
         cloth.pin({0, 10});
-        report("needle triangles", cloth, h, run(cloth, common, h, settling, nullptr), false);
+        report("needle triangles", cloth, h, runCloth(cloth, common, h, settling, nullptr), false);
       }
       {   // a corner yanked at 100 m/s for 20 ms, then held there until all is still
         ClothSetup cloth = sheet(grid, bending, 1e3, 1e-4);
         hung(cloth);
         double travelled = 0.0;
         report("yanked at 100 m/s", cloth, h,
-               run(cloth, common, h, settling,
-                   [&](int, ClothInputs& inputs) {
-                     const double move = std::min(100.0 * h, 2.0 - travelled);
-                     inputs.pins.col(1) += Eigen::Vector3d(0, 0, move);
-                     inputs.pins.col(0) += Eigen::Vector3d(0, 0, travelled > 1.0 ? move : 0.0);
-                     travelled += move;
-                     if (move <= 0 && inputs.pins(2, 0) < inputs.pins(2, 1))
-                       inputs.pins.col(0) +=
-                           Eigen::Vector3d(0, 0, std::min(0.2, inputs.pins(2, 1) - inputs.pins(2, 0)));
-                   }),
+               runCloth(cloth, common, h, settling,
+                        [&](int, ClothInputs& inputs) {
+                          const double move = std::min(100.0 * h, 2.0 - travelled);
+                          inputs.pins.col(1) += Eigen::Vector3d(0, 0, move);
+                          inputs.pins.col(0) += Eigen::Vector3d(0, 0, travelled > 1.0 ? move : 0.0);
+                          travelled += move;
+                          if (move <= 0 && inputs.pins(2, 0) < inputs.pins(2, 1))
+                            inputs.pins.col(0) +=
+                                Eigen::Vector3d(0, 0, std::min(0.2, inputs.pins(2, 1) - inputs.pins(2, 0)));
+                        }),
                true);
       }
     }
@@ -207,7 +207,7 @@ void runClothStability(StudyContext& context)
       hung(cloth);
       ClothOptions options = common;
       options.integrator = Integrator::symplectic_euler;
-      report("explicit", cloth, h, run(cloth, options, h, 500, nullptr, h < 1e-4), false);
+      report("explicit", cloth, h, runCloth(cloth, options, h, 500, nullptr, h < 1e-4), false);
     }
 
   // Held at two corners and let go: soft and stiff, thin and thick.

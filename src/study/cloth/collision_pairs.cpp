@@ -169,7 +169,7 @@ void meetAt(MovingPair& m, double t, const double* weights)
     m.point[i].to -= gap / t;
 }
 
-MovingPair draw(Random& random, int kind)
+MovingPair drawPair(Random& random, int kind)
 {
   MovingPair m;
   m.edges = random() % 2;
@@ -374,7 +374,7 @@ void runCollisionPairs(StudyContext& context, int count)
     context.progress(done, count, std::string("pairs: ") + kKinds[kind]);
     Random random(7 + batch);
     for (MovingPair& m : pairs)
-      m = draw(random, kind);
+      m = drawPair(random, kind);
     Tally& tally = tallies[kind];
     double start = threadSeconds();
     for (int i = 0; i < kBatch; ++i)

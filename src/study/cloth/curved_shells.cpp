@@ -177,13 +177,13 @@ double creep(Simulation& simulation, double seconds)
   return worst / sizeOf(shape);
 }
 
-constexpr double kSeconds = 10.0, kMostCreep = 1e-9;
+constexpr double kSecondsAtRest = 10.0, kMostCreep = 1e-9;
 
 /// Returns the creep. NaN: a step was refused.
 double atRest(StudyContext& context, const RestShape& shape, BendingModel bending, const Setting& setting)
 {
   Simulation simulation(sceneOf(shape, bending, setting));
-  const double worst = creep(simulation, kSeconds);
+  const double worst = creep(simulation, kSecondsAtRest);
   context.row()
       .set("case", "at rest")
       .set("shape", shape.name)
@@ -207,7 +207,7 @@ tracked:
     material: {area_density: 0.15, thickness: 0.001, youngs_modulus: 1.0e5, poissons_ratio: 0.3}
 )",
                                    "tracked", {}, folder.string()));
-  const double worst = creep(simulation, kSeconds);
+  const double worst = creep(simulation, kSecondsAtRest);
   context.row()
       .set("case", "tracked, at rest")
       .set("shape", shape.name)
@@ -286,7 +286,7 @@ constexpr int kModes = 4;
 const ShellMaterial kShell{1.0, 1e6, 0.3, 1e6 * 2e-3 * 2e-3 / 12, -1.0 / 3};
 
 /// Largest relative difference of two lists of frequencies.
-double difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b)
+double largestDifference(const Eigen::VectorXd& a, const Eigen::VectorXd& b)
 {
   return (a.array() / b.array() - 1).abs().maxCoeff();
 }
@@ -308,7 +308,7 @@ VibratingShell arch(int columns)
     shell.mesh.vertices.col(i) = Vector3d(shell.mesh.vertices(0, i), kRadius * std::sin(a), kRadius * std::cos(a));
   }
   shell.expected = archFrequencies(kShell, kRadius, kAngle, width, 18, kModes);
-  shell.unsure = difference(archFrequencies(kShell, kRadius, kAngle, width, 14, kModes), shell.expected);
+  shell.unsure = largestDifference(archFrequencies(kShell, kRadius, kAngle, width, 14, kModes), shell.expected);
   return shell;
 }
 
@@ -326,7 +326,7 @@ VibratingShell cap(int rings)
     shell.mesh.vertices.col(i) = kRadius * Vector3d(share * at.x(), share * at.y(), std::cos(a));
   }
   shell.expected = capFrequencies(kShell, kRadius, kAngle, 14, kModes);
-  shell.unsure = difference(capFrequencies(kShell, kRadius, kAngle, 10, kModes), shell.expected);
+  shell.unsure = largestDifference(capFrequencies(kShell, kRadius, kAngle, 10, kModes), shell.expected);
   return shell;
 }
 

@@ -5,7 +5,7 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kSphere = 0.2;   // [m]
+constexpr double kSphereRadius = 0.2;   // [m]
 constexpr double kThickness = 4e-3;
 
 /// 1 m x 1 m over a sphere about the origin.
@@ -16,14 +16,14 @@ SheetScene sheetOverSphere(const std::string& name, int cells, double stiffness,
   s.name = name;
   s.mesh = gridMesh(1.0, 1.0, cells, cells, GridPattern::alternating);
   s.columns = s.rows = cells;
-  s.start = s.mesh.vertices.colwise() - Eigen::Vector3d(0.5, 0.5, -(kSphere + kThickness));
+  s.start = s.mesh.vertices.colwise() - Eigen::Vector3d(0.5, 0.5, -(kSphereRadius + kThickness));
   s.model = buildCloth(name, s.mesh, area_density, isotropicMembrane(stiffness, 0.3, 1.0));
   s.model.bending_modulus = bending_modulus;
   s.model.mass_damping = 4.0;   // only where it comes to rest matters
   s.model.stiffness_damping = 2e-3;
   s.contact.thickness = kThickness;
   s.contact.friction = 0.4;
-  s.solids.push_back({Sphere{kSphere}, -1.0, {}});
+  s.solids.push_back({Sphere{kSphereRadius}, -1.0, {}});
   s.step = step;
   s.duration = duration;
   s.keep_from = duration - 0.5 * s.step;
@@ -32,7 +32,7 @@ SheetScene sheetOverSphere(const std::string& name, int cells, double stiffness,
 
 SurfacePicture::Panel panelOf(const std::string& label, const SheetScene& scene, const Eigen::Matrix3Xd& x)
 {
-  return {label, {{{x, scene.mesh.triangles}}, {icosphere(0.95 * kSphere, 4), false}}};
+  return {label, {{{x, scene.mesh.triangles}}, {icosphere(0.95 * kSphereRadius, 4), false}}};
 }
 
 struct Runs

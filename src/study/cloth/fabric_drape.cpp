@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846, kGravity = 9.81;
+constexpr double kGravity = 9.81;
 constexpr double kDisc = 0.15, kSupport = 0.09;   // radii [m]
 // As in the test, the rim is lowered, not dropped: its weight comes on over this time. Folds are multistable, and in a
 // fall those win that grow fastest, which the damping of the integrator decides: silk dropped at once came to rest at
@@ -62,7 +62,7 @@ Disc drapeDisc(int free_rings)
   const double h = (kDisc - kSupport) / (free_rings + 0.5), pinned = kSupport + 0.5 * h;
   const int inner = static_cast<int>(std::lround(pinned / h)), rings = inner + free_rings;
   std::mt19937 random(7);
-  std::uniform_real_distribution<double> turn(0.0, 2 * kPi);
+  std::uniform_real_distribution<double> turn(0.0, 2 * M_PI);
   std::vector<Vector3d> vertices{Vector3d::Zero()};
   std::vector<Eigen::Vector3i> faces;
   Disc disc;
@@ -72,13 +72,13 @@ Disc drapeDisc(int free_rings)
   for (int ring = 1; ring <= rings; ++ring)
   {
     const double radius = ring <= inner ? ring * pinned / inner : kDisc - (rings - ring) * h;
-    const int count = static_cast<int>(std::lround(2 * kPi * radius / (h / std::sqrt(0.75)))),
+    const int count = static_cast<int>(std::lround(2 * M_PI * radius / (h / std::sqrt(0.75)))),
               first = static_cast<int>(vertices.size());
-    const double start = last.empty() ? turn(random) : last[0] + std::fmod(turn(random), 2 * kPi / count);
+    const double start = last.empty() ? turn(random) : last[0] + std::fmod(turn(random), 2 * M_PI / count);
     std::vector<double> angles;
     for (int k = 0; k < count; ++k)
     {
-      angles.push_back(start + 2 * kPi * k / count);
+      angles.push_back(start + 2 * M_PI * k / count);
       if (ring <= inner)
         disc.pinned.push_back(first + k);
       vertices.emplace_back(radius * std::cos(angles[k]), radius * std::sin(angles[k]), 0.0);
@@ -87,8 +87,8 @@ Disc drapeDisc(int free_rings)
     const int before = static_cast<int>(last.size());
     for (int a = 0, b = 0; a < before || b < count;)
     {
-      const double next_a = a < before ? last[(a + 1) % before] + (a + 1 == before ? 2 * kPi : 0.0) : 1e9;
-      const double next_b = b < count ? angles[(b + 1) % count] + (b + 1 == count ? 2 * kPi : 0.0) : 1e9;
+      const double next_a = a < before ? last[(a + 1) % before] + (a + 1 == before ? 2 * M_PI : 0.0) : 1e9;
+      const double next_b = b < count ? angles[(b + 1) % count] + (b + 1 == count ? 2 * M_PI : 0.0) : 1e9;
       const int at_a = last_first + (before ? a % before : 0), at_b = first + b % count;
       if (next_a < next_b)
         faces.emplace_back(at_a, at_b, last_first + (++a) % before);
@@ -141,8 +141,8 @@ double drapeCoefficient(const TriangleMesh& mesh, const Eigen::Matrix3Xd& x)
   for (int i = 0; i < kPixels; ++i)
     for (int j = 0; j < kPixels; ++j)
       shadow += dark[i * kPixels + j] || middle(i) * middle(i) + middle(j) * middle(j) < kSupport * kSupport;
-  const double support = kPi * kSupport * kSupport;
-  return (shadow * kPixel * kPixel - support) / (kPi * kDisc * kDisc - support);
+  const double support = M_PI * kSupport * kSupport;
+  return (shadow * kPixel * kPixel - support) / (M_PI * kDisc * kDisc - support);
 }
 
 /// Waves of the edge: maxima of its distance from the axis.
@@ -160,8 +160,8 @@ int folds(const Eigen::Matrix3Xd& x, const MeshTopology& topology)
     double c = 0, s = 0;
     for (int k = 0; k < n; ++k)
     {
-      c += radius[k] * std::cos(2 * kPi * wave * k / n);
-      s += radius[k] * std::sin(2 * kPi * wave * k / n);
+      c += radius[k] * std::cos(2 * M_PI * wave * k / n);
+      s += radius[k] * std::sin(2 * M_PI * wave * k / n);
     }
     if (std::hypot(c, s) > most)
     {

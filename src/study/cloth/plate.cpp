@@ -12,8 +12,6 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 bool isConforming(BendingModel model) { return model == BendingModel::isometric_conforming; }
 
 /// Hinges are an isotropic plate (Poisson's ratio -1/3) on equilateral triangles only; vertex-based bending on all
@@ -34,7 +32,7 @@ std::string keyOf(const char* what, GridPattern pattern, BendingModel model)
 /// The plane z = 0 rolled up along a direction in it.
 Eigen::Matrix3Xd rolled(const Eigen::Matrix3Xd& flat, double radius, double degrees)
 {
-  const double a = degrees * kPi / 180;
+  const double a = degrees * M_PI / 180;
   const Eigen::Vector3d along(std::cos(a), std::sin(a), 0), across(-along.y(), along.x(), 0);
   Eigen::Matrix3Xd x(3, flat.cols());
   for (Eigen::Index i = 0; i < flat.cols(); ++i)
@@ -107,7 +105,7 @@ void cylindersAndSpheres(StudyContext& context)
           .set("case", "sphere")
           .set("mesh", "icosphere " + std::to_string(level))
           .set("model", toString(model))
-          .check(plateEnergy(sphere, t, model, sphere.vertices) / (8 * kPi), expected, 0.02 * expected,
+          .check(plateEnergy(sphere, t, model, sphere.vertices) / (8 * M_PI), expected, 0.02 * expected,
                  "E = 8 pi D (1 + nu)/2, nu = 1 conforming, -1/3 hinges");
     }
   }

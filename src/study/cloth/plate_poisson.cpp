@@ -47,7 +47,7 @@ double lateralThreshold(double width, double nu)
 
 /// Square plates. The bounds are those of the study plate: 2 % of the value extrapolated to fine meshes, and an error
 /// that halves with the cells.
-void uniformLoad(StudyContext& context)
+void uniformLoadByRatio(StudyContext& context)
 {
   const std::vector<int> sizes = context.quick() ? std::vector<int>{26, 52} : std::vector<int>{26, 52, 104};
   for (const bool clamped : {true, false})
@@ -92,7 +92,7 @@ void uniformLoad(StudyContext& context)
 }
 
 /// The bound is that of the study plate.
-void lateralBuckling(StudyContext& context)
+void lateralBucklingByRatio(StudyContext& context)
 {
   const std::vector<int> sizes = context.quick() ? std::vector<int>{28} : std::vector<int>{28, 56, 112};
   for (const double width : {0.25, 0.5})
@@ -183,8 +183,8 @@ void cost(StudyContext& context)
 void runPlatePoisson(StudyContext& context)
 {
   useOneBlasThread();
-  uniformLoad(context);
-  lateralBuckling(context);
+  uniformLoadByRatio(context);
+  lateralBucklingByRatio(context);
   otherMeshes(context);
   cost(context);
   context.note(

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-struct Case
+struct HoleCase
 {
   std::string name;
   TriangleMesh mesh;
@@ -47,10 +47,10 @@ TriangleMesh cutTorus(const Vector3d& middle, double radius)
   return cutAway(torus, [=](const Vector3d& p) { return (p - middle).norm() > radius; });
 }
 
-std::vector<Case> cases(bool quick)
+std::vector<HoleCase> cases(bool quick)
 {
   const double cap = std::cos(M_PI / 4);
-  std::vector<Case> all{
+  std::vector<HoleCase> all{
       {"sphere, cap of 45 degrees", cutSphere(5, cap), 0.043, fromSphere, 0.005, "max_radius_error"},
       {"sphere, hemisphere", cutSphere(4, 0.0), 0.0, fromSphere, 0.02, "max_radius_error_hemisphere"}};
   if (quick)
@@ -96,9 +96,9 @@ void runWillmoreHole(StudyContext& context)
   Plot& profile = context.plot("willmore_hole_profile", "Patches seen from the side: radius against height", "z [m]",
                                "distance from the origin - 1 [m]");
   profile.log_x = profile.log_y = profile.lines = false;
-  const std::vector<Case> all = cases(context.quick());
+  const std::vector<HoleCase> all = cases(context.quick());
   int done = 0;
-  for (const Case& c : all)
+  for (const HoleCase& c : all)
   {
     context.progress(done++, static_cast<int>(all.size()), c.name);
     TriangleMesh mesh = c.mesh;

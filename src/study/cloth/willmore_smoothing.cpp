@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kSteps = 16;
+constexpr int kSmoothingSteps = 16;
 constexpr double kTube = 0.45;   ///< radius [m]
 
 /// Centreline of a trefoil on a torus, and the torus's normal there.
@@ -30,14 +30,14 @@ Vector3d onTube(double s, double t)
   return centreline(s) + kTube * (std::cos(t) * outward + std::sin(t) * tangent.cross(outward));
 }
 
-struct Case
+struct SmoothedSurface
 {
   const char* name;
   int along, around;                           ///< 2 along around triangles
   double thesis_factorization, thesis_steps;   ///< [s]
 };
 
-constexpr Case kCases[] = {{"hand", 252, 48, 5.31, 4.42}, {"dinosaur", 351, 64, 8.77, 7.47}};
+constexpr SmoothedSurface kSmoothedSurfaces[] = {{"hand", 252, 48, 5.31, 4.42}, {"dinosaur", 351, 64, 8.77, 7.47}};
 
 /// Root mean square of the vertices' distances from the tube's surface [m].
 double roughness(const Eigen::Matrix3Xd& vertices, const Eigen::Matrix3Xd& line)
@@ -62,7 +62,7 @@ double volume(const TriangleMesh& mesh)
   return sum;
 }
 
-struct Outcome
+struct Smoothed
 {
   double factorization = INFINITY, steps = INFINITY;   ///< [s]
   int iterations = 0;
@@ -70,16 +70,16 @@ struct Outcome
   TriangleMesh mesh;
 };
 
-Outcome flow(const TriangleMesh& start, const MeshTopology& topology, double edge)
+Smoothed flow(const TriangleMesh& start, const MeshTopology& topology, double edge)
 {
-  Outcome outcome;
+  Smoothed outcome;
   outcome.mesh = start;
   const auto begin = std::chrono::steady_clock::now();
   WillmoreFlow flow(start, topology, std::pow(edge, 4), 10);
   outcome.factorization = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   outcome.energies.push_back(flow.energy(start.vertices));
   const double before = threadSeconds();
-  for (int k = 0; k < kSteps; ++k)
+  for (int k = 0; k < kSmoothingSteps; ++k)
   {
     const FairingReport report = flow.step(outcome.mesh.vertices);
     if (!report.ok)
@@ -103,7 +103,7 @@ void runWillmoreSmoothing(StudyContext& context)
     line.col(k) = centreline(2 * M_PI * static_cast<double>(k) / static_cast<double>(line.cols()));
   const int repeats = context.quick() ? 1 : 3;
   int done = 0;
-  for (const Case& c : kCases)
+  for (const SmoothedSurface& c : kSmoothedSurfaces)
   {
     const TriangleMesh smooth = closedGrid(c.along, c.around, onTube);
     TriangleMesh rough = smooth;
@@ -113,18 +113,18 @@ void runWillmoreSmoothing(StudyContext& context)
       rough.vertices.data()[k] += 0.25 * edge * (engine() * 0x1p-31 - 1.0);
     const MeshTopology topology = meshTopology(rough);
     const std::string triangles = std::to_string(smooth.triangles.cols());
-    Outcome best;
+    Smoothed best;
     for (int repeat = 0; repeat < repeats; ++repeat)
     {
-      context.progress(done++, repeats * static_cast<int>(std::size(kCases)), triangles + " triangles");
-      const Outcome outcome = flow(rough, topology, edge);
+      context.progress(done++, repeats * static_cast<int>(std::size(kSmoothedSurfaces)), triangles + " triangles");
+      const Smoothed outcome = flow(rough, topology, edge);
       best.factorization = std::min(best.factorization, outcome.factorization);
       best.steps = std::min(best.steps, outcome.steps);
       best.energies = outcome.energies;
       best.iterations = outcome.iterations;
       best.mesh = outcome.mesh;
     }
-    const Outcome even = flow(smooth, topology, edge);   // what the flow does to the tube itself
+    const Smoothed even = flow(smooth, topology, edge);   // what the flow does to the tube itself
     const double before = roughness(rough.vertices, line), after = roughness(best.mesh.vertices, line);
     const double swelling = volume(best.mesh) / volume(smooth) - 1.0;
     context.row()
@@ -147,12 +147,12 @@ void runWillmoreSmoothing(StudyContext& context)
     context.metric("roughness_left_" + triangles, after / before);
     context.metric("volume_change_" + triangles, swelling);
     Series& series = plot.at(triangles + " triangles");
-    for (int k = 0; k <= kSteps; ++k)
+    for (int k = 0; k <= kSmoothingSteps; ++k)
     {
       series.x.push_back(k);
       series.y.push_back(best.energies[k]);
     }
-    if (&c != kCases)
+    if (&c != kSmoothedSurfaces)
       continue;
     Plot& picture = addPicture(context, "willmore_smoothing_meshes",
                                triangles + " triangles, before and after 16 steps", "x [m]", "y [m]");

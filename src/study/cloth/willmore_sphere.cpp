@@ -13,8 +13,8 @@
 namespace slender::study {
 namespace {
 
-constexpr int kSteps = 10;
-constexpr double kSphere = 16.0 * M_PI;   ///< int H^2
+constexpr int kFlowSteps = 10;
+constexpr double kSphereEnergy = 16.0 * M_PI;   ///< int H^2
 
 struct Start
 {
@@ -54,24 +54,24 @@ struct Run
   TriangleMesh mesh;
 };
 
-Run run(const TriangleMesh& start, double time_step, int iterations)
+Run flowFrom(const TriangleMesh& start, double time_step, int iterations)
 {
   Run run;
   run.mesh = start;
   const auto begin = std::chrono::steady_clock::now();
   WillmoreFlow flow(start, meshTopology(start), time_step, iterations);
   run.factorization = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  run.errors.push_back(2.0 * flow.energy(run.mesh.vertices) / kSphere - 1.0);
+  run.errors.push_back(2.0 * flow.energy(run.mesh.vertices) / kSphereEnergy - 1.0);
   const double before = threadSeconds();
-  for (int k = 0; k < kSteps; ++k)
+  for (int k = 0; k < kFlowSteps; ++k)
   {
     const FairingReport report = flow.step(run.mesh.vertices);
     if (!report.ok)
       throw std::runtime_error("willmore_sphere: step " + std::to_string(k + 1) + ": " + report.message);
-    run.errors.push_back(2.0 * report.energy / kSphere - 1.0);
+    run.errors.push_back(2.0 * report.energy / kSphereEnergy - 1.0);
     run.cuts += report.cuts;
   }
-  run.step = (threadSeconds() - before) / kSteps;
+  run.step = (threadSeconds() - before) / kFlowSteps;
   return run;
 }
 
@@ -96,12 +96,12 @@ void runWillmoreSphere(StudyContext& context)
     for (const Scheme& scheme : kSchemes)
     {
       context.progress(done++, static_cast<int>(starts.size() * std::size(kSchemes)), start.name);
-      const Run r = run(start.mesh, scheme.time_step, scheme.iterations);
-      const double independent = independentEnergy(r.mesh) / kSphere - 1.0;
+      const Run r = flowFrom(start.mesh, scheme.time_step, scheme.iterations);
+      const double independent = independentEnergy(r.mesh) / kSphereEnergy - 1.0;
       const Eigen::Vector3d middle = r.mesh.vertices.rowwise().mean();
       const Eigen::VectorXd radii = (r.mesh.vertices.colwise() - middle).colwise().norm();
-      int within = kSteps + 1;
-      for (int k = kSteps; k >= 0 && std::abs(r.errors[k]) <= 0.01; --k)
+      int within = kFlowSteps + 1;
+      for (int k = kFlowSteps; k >= 0 && std::abs(r.errors[k]) <= 0.01; --k)
         within = k;
       Row& row = context.row();
       row.set("start", start.name)
@@ -119,9 +119,10 @@ void runWillmoreSphere(StudyContext& context)
       const bool main = &start == &starts.front() && &scheme == kSchemes, last = &scheme == std::end(kSchemes) - 1;
       if (main || last)
       {
-        row.check(kSphere * (1.0 + independent), kSphere, 0.01 * kSphere, "int H^2 = 16 pi; conforming, Voronoi cells");
+        row.check(kSphereEnergy * (1.0 + independent), kSphereEnergy, 0.01 * kSphereEnergy,
+                  "int H^2 = 16 pi; conforming, Voronoi cells");
         Series& series = plot.at(start.name + (last ? ", iterated" : ", one iteration"));
-        for (int k = 0; k <= kSteps; ++k)
+        for (int k = 0; k <= kFlowSteps; ++k)
         {
           series.x.push_back(k);
           series.y.push_back(std::abs(r.errors[k]));

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 
 /// How often one ring winds through another [-]; open ones closed by a straight edge. Exact for polylines (solid
 /// angles).
-int linking(const RodState& a, const RodState& b)
+int linkingNumber(const RodState& a, const RodState& b)
 {
   double sum = 0;
   const auto next = [](const RodState& r, Eigen::Index i) { return r.x.col((i + 1) % r.x.cols()); };
@@ -41,7 +41,7 @@ int hooked(const std::vector<RodState>& links)
 {
   int count = 0;
   for (std::size_t k = 0; k + 1 < links.size(); ++k)
-    count += linking(links[k], links[k + 1]);
+    count += linkingNumber(links[k], links[k + 1]);
   return count;
 }
 
@@ -122,8 +122,8 @@ void cutChain(StudyContext& context, int links, int edges, double way, Plot& pic
         drawChain(picture, std::to_string(static_cast<int>(1e3 * looks[look])) + " ms after the cut", models,
                   g.state.rods, 0.25 * static_cast<double>(look + 1));
   }
-  const int left = linking(g.state.rods[middle - 1], g.state.rods[middle]),
-            right = linking(g.state.rods[middle], g.state.rods[middle + 1]);
+  const int left = linkingNumber(g.state.rods[middle - 1], g.state.rods[middle]),
+            right = linkingNumber(g.state.rods[middle], g.state.rods[middle + 1]);
   row("hooks that hold at the cut link's weaker side")
       .set("parted_after", parted)
       .check(std::min(left, right), 0, 0.5, "the chain parts there");

@@ -178,7 +178,7 @@ MixedScene sheets(Draw& draw)
           25};
 }
 
-MixedScene draw(int number)
+MixedScene drawnScene(int number)
 {
   Draw source(1000u + static_cast<unsigned>(number));
   switch (number % 6)
@@ -212,7 +212,7 @@ bool finite(const SceneState& state)
 
 void runScene(StudyContext& context, int number, Tally& tally)
 {
-  const MixedScene mixed = draw(number);
+  const MixedScene mixed = drawnScene(number);
   Simulation scene(parseScene(mixed.text, "mixed"));
   MixedCheck check(scene);
   Tally own;
@@ -264,7 +264,7 @@ void runCoupledSafety(StudyContext& context)
   Tally tally;
   for (int k = 0; k < scenes; ++k)
   {
-    context.progress(k, scenes, draw(k).kind);
+    context.progress(k, scenes, drawnScene(k).kind);
     runScene(context, k, tally);
   }
   context.metric("scenes", scenes);

@@ -85,7 +85,7 @@ double solidAngle(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xi& triangles, 
 
 /// Gauss's linking integral of two open polylines, exact segment by segment [Klenin & Langowski 2000]. Where they pass
 /// through each other it jumps by 1.
-double linking(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y)
+double linkingIntegral(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y)
 {
   double sum = 0.0;
   for (Eigen::Index i = 0; i + 1 < x.cols(); ++i)
@@ -294,7 +294,7 @@ void MixedCheck::checkSides(MixedFindings& out)
   for (std::size_t i = 0; i < rods; ++i)
     for (std::size_t j = i + 1; j < rods; ++j)
     {
-      now.push_back({4.0 * linking(x_[i], x_[j])});   // large: 1, of at most 2
+      now.push_back({4.0 * linkingIntegral(x_[i], x_[j])});   // large: 1, of at most 2
       pairs.push_back(names_[i] + " and " + names_[j]);
     }
   for (std::size_t c = rods; c < names_.size(); ++c)

@@ -15,8 +15,6 @@ namespace {
 
 /// over the length: what in-plane deformation changes of the loads is of its square
 constexpr double kThickness = 2e-3;
-/// of the length: a plate that left its plane is farther, one that stayed is at 1e-9
-constexpr double kAway = 1e-5;
 
 /// A plate of length 1 with D = 1 in the plane z = 0, and how it is loaded.
 struct PlateCase
@@ -40,7 +38,7 @@ ClothModel plateOf(const std::string& name, const TriangleMesh& mesh, BendingMod
 }
 
 /// Number of negative eigenvalues of the Hessian on the free vertices. Shares no line with the search of the statics.
-int negativeModes(const ClothSetup& plate)
+int negativePlateModes(const ClothSetup& plate)
 {
   const ClothModel& model = *plate.model;
   const BlockMatrix hessian = elasticHessian(model, plate.state);
@@ -68,7 +66,7 @@ int negativeModes(const ClothSetup& plate)
   return static_cast<int>((factor.vectorD().array() <= 0).count());
 }
 
-double acrossPlane(const ClothSetup& plate) { return plate.state.x.row(2).cwiseAbs().maxCoeff(); }
+double outOfPlane(const ClothSetup& plate) { return plate.state.x.row(2).cwiseAbs().maxCoeff(); }
 
 /// The plate in its plane under a load. Throws where statics does not find that.
 ClothSetup flatPlate(const PlateCase& c, double load)
@@ -78,7 +76,7 @@ ClothSetup flatPlate(const PlateCase& c, double load)
   c.load(plate, load);
   ClothStepper stepper(plate.model, ClothOptions{});
   const StepReport report = stepper.solveEquilibrium(plate.state, plate.inputs, false);
-  if (!report.ok || acrossPlane(plate) > 1e-9)
+  if (!report.ok || outOfPlane(plate) > 1e-9)
     throw std::runtime_error("statics_stability: the flat plate " + c.label + " was not found: " + report.message);
   return plate;
 }
@@ -87,27 +85,28 @@ ClothSetup flatPlate(const PlateCase& c, double load)
 double meshThreshold(const PlateCase& c)
 {
   double low = 0.5 * c.expected, high = 1.5 * c.expected;
-  if (negativeModes(flatPlate(c, low)) > 0 || negativeModes(flatPlate(c, high)) == 0)
+  if (negativePlateModes(flatPlate(c, low)) > 0 || negativePlateModes(flatPlate(c, high)) == 0)
     throw std::runtime_error("statics_stability: the threshold of plate " + c.label +
                              " is not near that of plate theory");
   while (high - low > 1e-3 * low)
   {
     const double middle = 0.5 * (low + high);
-    (negativeModes(flatPlate(c, middle)) > 0 ? high : low) = middle;
+    (negativePlateModes(flatPlate(c, middle)) > 0 ? high : low) = middle;
   }
   return 0.5 * (low + high);
 }
 
-void judge(StudyContext& context, const PlateCase& c, double threshold, double factor, StaticsTally& tally)
+void judgePlate(StudyContext& context, const PlateCase& c, double threshold, double factor, StaticsTally& tally)
 {
   ClothSetup plate = flatPlate(c, factor * threshold);
-  const int before = negativeModes(plate);
+  const int before = negativePlateModes(plate);
   const bool leaves = factor > 1;
   ClothStepper stepper(plate.model, ClothOptions{});
   const StepReport report = stepper.solveEquilibrium(plate.state, plate.inputs);
-  const double away = report.ok ? acrossPlane(plate) : 0.0;
-  const int after = report.ok ? negativeModes(plate) : 0;
-  const bool wrong = !report.ok || (leaves && (away < kAway || after > 0)) || (!leaves && away > kAway);
+  const double away = report.ok ? outOfPlane(plate) : 0.0;
+  const int after = report.ok ? negativePlateModes(plate) : 0;
+  const bool wrong =
+      !report.ok || (leaves && (away < kAwayFromBranch || after > 0)) || (!leaves && away > kAwayFromBranch);
   const bool called_stable = report.ok && report.stable && after > 0;
   ++tally.cases;
   tally.wrong += wrong;
@@ -209,7 +208,7 @@ void addPlates(StudyContext& context, StaticsTally& tally)
             .check(threshold, c.expected, c.expected * (0.02 + 2.0 / cells),
                    "plate theory; bound of the study plate, 2 % + 2/n");
         for (const double factor : {0.97, 1.03, 1.2})
-          judge(context, c, threshold, factor, tally);
+          judgePlate(context, c, threshold, factor, tally);
       }
 }
 

@@ -4,6 +4,9 @@
 
 namespace slender::study {
 
+/// Ratio of distance to length. A state that left its branch is farther away, and one that stayed is within 1e-9.
+constexpr double kAwayFromBranch = 1e-5;
+
 /// What all cases of the study of statics came to.
 struct StaticsTally
 {

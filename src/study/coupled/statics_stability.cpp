@@ -45,7 +45,7 @@ double groundOf(double stretch, double length, int edges)
 }
 
 /// Number of negative eigenvalues of K + ground M, by the rod's own matrix. Shares no line with the statics' search.
-int negativeModes(const RodSetup& rod, double ground)
+int negativeRodModes(const RodSetup& rod, double ground)
 {
   RodSystem system(*rod.model);
   system.load(rod.state);
@@ -60,23 +60,20 @@ int negativeModes(const RodSetup& rod, double ground)
   return inertia.negative + inertia.zero;
 }
 
-/// ratio of distance to length; a state that left its branch is farther away, and one that stayed is within 1e-9
-constexpr double kAway = 1e-5;
-
 /// `shape`: a number for the column `localisation`, of the end where the rod left its branch.
-void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally,
-           const std::function<double(const RodState&)>& shape = nullptr)
+void judgeRod(StudyContext& context, const StaticsCase& c, StaticsTally& tally,
+              const std::function<double(const RodState&)>& shape = nullptr)
 {
-  const int before = negativeModes(c.rod, c.ground);
+  const int before = negativeRodModes(c.rod, c.ground);
   const bool near = std::abs(c.factor - 1) <= c.trusted;
   const bool leaves = near ? before > 0 : c.factor > 1;
   RodSetup rod = c.rod;
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
   const StepReport report = stepper.solveEquilibrium(rod.state, rod.inputs);
   const double away = report.ok ? c.away(rod.state) : 0.0;
-  const int after = report.ok ? negativeModes(rod, c.ground) : 0;
-  const bool refused = !report.ok,
-             wrong = refused || (leaves && (away < kAway || after > 0)) || (!leaves && away > kAway);
+  const int after = report.ok ? negativeRodModes(rod, c.ground) : 0;
+  const bool refused = !report.ok, wrong = refused || (leaves && (away < kAwayFromBranch || after > 0)) ||
+                                           (!leaves && away > kAwayFromBranch);
   const bool called_stable = report.ok && report.stable && after > 0;
   ++tally.cases;
   tally.wrong += wrong;
@@ -97,7 +94,7 @@ void judge(StudyContext& context, const StaticsCase& c, StaticsTally& tally,
   row.set("stable", report.stable ? "yes" : "no").set("saddles_left", report.escapes).set("energy", report.energy);
   if (refused)
     row.set("refused", report.message);
-  if (shape && away > kAway)
+  if (shape && away > kAwayFromBranch)
     row.set("localisation", shape(rod.state));
   row.check(wrong + called_stable, 0, 0.5,
             leaves ? "must leave the branch for a stable state" : "must stay on the branch");
@@ -145,13 +142,13 @@ void addLateral(StudyContext& context, StaticsTally& tally, const std::vector<in
           RodSetup planar = c.rod;
           relaxPlanar(planar, 1);
           // the branch that decides is the bent one; the search starts from the straight rod
-          if (c.trusted > 1 && negativeModes(planar, 0.0) == 0)
+          if (c.trusted > 1 && negativeRodModes(planar, 0.0) == 0)
             continue;
           c.trusted = std::min(c.trusted, 0.1);
         }
         c.away = acrossPlane;
         context.progress(tally.cases, 0, c.family + " " + c.label);
-        judge(context, c, tally);
+        judgeRod(context, c, tally);
       }
 }
 
@@ -250,7 +247,7 @@ void addBendTwist(StudyContext& context, StaticsTally& tally, const std::vector<
         c.rod = curl.rod();
         c.away = acrossPlane;
         context.progress(tally.cases, 0, c.family + " " + c.label);
-        judge(context, c, tally);
+        judgeRod(context, c, tally);
       }
     }
   }
@@ -319,7 +316,7 @@ void addHelices(StudyContext& context, StaticsTally& tally, const std::vector<in
       {
         const StaticsCase c = twistedRod(rod, edges, factor);
         context.progress(tally.cases, 0, c.family + " " + c.label);
-        judge(context, c, tally);
+        judgeRod(context, c, tally);
       }
 }
 
@@ -357,7 +354,7 @@ void addLocalisedHelices(StudyContext& context, StaticsTally& tally, const std::
         const double twist = c.rod.state.twist.sum();
         c.away = [twist](const RodState& s) { return std::max(acrossAxis(s), std::abs(s.twist.sum() - twist)); };
         context.progress(tally.cases, 0, c.family + " " + c.label);
-        judge(context, c, tally, localisation);
+        judgeRod(context, c, tally, localisation);
       }
 }
 
@@ -394,7 +391,7 @@ void addRings(StudyContext& context, StaticsTally& tally, const std::vector<int>
           return std::max(across, std::abs(s.twist.sum()));
         };
         context.progress(tally.cases, 0, c.family + " " + c.label);
-        judge(context, c, tally);
+        judgeRod(context, c, tally);
       }
 }
 
@@ -443,7 +440,7 @@ void addColumns(StudyContext& context, StaticsTally& tally, const std::vector<in
           require(stepper.solveEquilibrium(c.rod.state, c.rod.inputs), "straight column");
         }
         context.progress(tally.cases, 0, c.family + " " + c.label);
-        judge(context, c, tally);
+        judgeRod(context, c, tally);
       }
 }
 

@@ -116,7 +116,7 @@ Record swing(const Spring& s, int edges_per_turn, const JointOptions& joints, do
 }
 
 /// Fig. 4.9.
-void draw(StudyContext& context, const Spring& s, const Record& r)
+void plotExchange(StudyContext& context, const Spring& s, const Record& r)
 {
   const std::string title = std::string("Wilberforce pendulum ") + s.name;
   Plot& energy = context.plot(std::string("wilberforce_energy_") + s.name, title + ": exchange of energy", "time [s]",
@@ -192,7 +192,7 @@ void runWilberforce(StudyContext& context)
         newRow("passed to turning").set("measured", peak(r.turning, 0, r.turning.size()) / all);
         newRow("largest sway [m]").set("measured", *std::max_element(r.sway.begin(), r.sway.end()));
         if (per_turn == 24 && checked)
-          draw(context, s, r);
+          plotExchange(context, s, r);
       }
   context.note(
       "Nodes on the coil; joints as of the scene keys matched_to_arcs and curvature. Compensated joints do not replace "

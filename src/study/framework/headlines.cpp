@@ -10,7 +10,7 @@ namespace slender::study {
 
 namespace {
 
-std::vector<Headline>& registered()
+std::vector<Headline>& registeredHeadlines()
 {
   static std::vector<Headline> all;
   return all;
@@ -91,10 +91,10 @@ std::string rounded(double value, int digits, double& after)
 
 HeadlineRegistration::HeadlineRegistration(std::vector<Headline> headlines)
 {
-  registered().insert(registered().end(), headlines.begin(), headlines.end());
+  registeredHeadlines().insert(registeredHeadlines().end(), headlines.begin(), headlines.end());
 }
 
-const std::vector<Headline>& headlines() { return registered(); }
+const std::vector<Headline>& headlines() { return registeredHeadlines(); }
 
 FigureValue valueOf(const Figure& figure, const ResultValues& result)
 {

@@ -6,7 +6,7 @@ namespace slender::study {
 
 namespace {
 
-std::vector<Study>& registered()
+std::vector<Study>& registeredStudies()
 {
   static std::vector<Study> all;
   return all;
@@ -16,12 +16,12 @@ std::vector<Study>& registered()
 
 StudyRegistration::StudyRegistration(const char* name, const char* description, void (*run)(StudyContext&))
 {
-  std::vector<Study>& all = registered();
+  std::vector<Study>& all = registeredStudies();
   const auto before = [](const Study& study, const std::string& other) { return study.name < other; };
   all.insert(std::lower_bound(all.begin(), all.end(), std::string(name), before), Study{name, description, run});
 }
 
-const std::vector<Study>& studies() { return registered(); }
+const std::vector<Study>& studies() { return registeredStudies(); }
 
 const Study* findStudy(const std::string& name)
 {

@@ -163,7 +163,7 @@ double availableBytes()
   return 4e9;
 }
 
-void measure(const std::string& scene, double enough, Sample& sample)
+void measureSample(const std::string& scene, double enough, Sample& sample)
 {
   const double start = threadSeconds(), before = residentBytes();
   Simulation simulation(parseScene(scene, "cost_model.yaml"));
@@ -219,7 +219,7 @@ Sample measureApart(const std::string& scene, double enough)
     Sample sample;
     try
     {
-      measure(scene, enough, sample);
+      measureSample(scene, enough, sample);
     }
     catch (const std::exception& error)
     {

@@ -210,7 +210,7 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   return result;
 }
 
-struct Costs
+struct BendingCosts
 {
   double gradient[2], hessian[2], explicit_step[2], implicit_step[2];   ///< hinge, isometric [s]
   double factored_step;                                                 ///< implicit, hinges, by Cholesky [s]
@@ -241,9 +241,9 @@ double gradientDifference(const TriangleMesh& mesh, const HingeBending& hinges, 
 
 constexpr int kStepsShared = 1000;   // of a scene, over which the constant matrix's assembly is spread
 
-Costs measure(const TriangleMesh& mesh, bool flag)
+BendingCosts measureBending(const TriangleMesh& mesh, bool flag)
 {
-  Costs costs{};
+  BendingCosts costs{};
   ClothSetup isometric = sheet(mesh, BendingModel::isometric_nonconforming, flag);
   {   // some way into the motion
     ClothStepper stepper(isometric.model, linearized());
@@ -338,7 +338,7 @@ void runIbmVsHinge(StudyContext& context)
         continue;
       context.progress(p.vertices, 25600, flag ? "flag" : "hung sheet");
       const TriangleMesh mesh = meshOf(p);
-      const Costs c = measure(mesh, flag);
+      const BendingCosts c = measureBending(mesh, flag);
       const struct
       {
         const char* what;

@@ -98,14 +98,6 @@ Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budge
 }
 
 /// How far apart two solutions are after each step, in the mean over vertices and steps [m].
-double rms(const std::vector<Eigen::Matrix3Xd>& a, const std::vector<Eigen::Matrix3Xd>& b)
-{
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k)
-    sum += (a[k] - b[k]).squaredNorm() / static_cast<double>(a[k].cols());
-  return std::sqrt(sum / static_cast<double>(a.size()));
-}
-
 struct Trajectory
 {
   std::vector<Eigen::Matrix3Xd> x;   ///< after each 10 ms
@@ -159,8 +151,8 @@ void compareSolvers(StudyContext& context, int side, double membrane)
         .set("iterations", static_cast<double>(t.iterations) / steps)
         .set("linear_iterations", static_cast<double>(t.linear_iterations) / steps)
         .set("largest_stretch", t.stretch)
-        .set("error_mm", 1e3 * rms(t.x, fine.x))
-        .set("solver_error_mm", 1e3 * rms(t.x, exact.x));
+        .set("error_mm", 1e3 * rmsDistance(t.x, fine.x))
+        .set("solver_error_mm", 1e3 * rmsDistance(t.x, exact.x));
     if (tolerance > 0)
       row.set("tolerance", tolerance);
   };
@@ -181,8 +173,8 @@ void compareSolvers(StudyContext& context, int side, double membrane)
       line((std::string("one step, ") + nameOf(solver)).c_str(), tolerance, t);
       if (tolerance == ClothOptions{}.linear_tolerance)
       {
-        over_factorised = std::max(over_factorised, rms(t.x, fine.x) / rms(exact.x, fine.x));
-        over_step = std::max(over_step, rms(t.x, exact.x) / rms(exact.x, fine.x));
+        over_factorised = std::max(over_factorised, rmsDistance(t.x, fine.x) / rmsDistance(exact.x, fine.x));
+        over_step = std::max(over_step, rmsDistance(t.x, exact.x) / rmsDistance(exact.x, fine.x));
       }
     }
   context.metric(stiff ? "error_over_factorised_stiff" : "error_over_factorised", over_factorised);

@@ -13,7 +13,7 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kRadius = 0.002, kSpacing = 0.012;   // [m]
+constexpr double kRodRadius = 0.002, kSpacing = 0.012;   // [m]
 
 /// Four layers of `rods` parallel rods each, crosswise, on a floor. Each rod has three edges per rod that it crosses.
 std::string pile(int rods, const std::string& solver)
@@ -27,14 +27,14 @@ std::string pile(int rods, const std::string& solver)
   for (int layer = 0; layer < 4; ++layer)
     for (int k = 0; k < rods; ++k)
     {
-      const double across = kSpacing * (k + 1), z = (2.05 * layer + 1.05) * kRadius;
+      const double across = kSpacing * (k + 1), z = (2.05 * layer + 1.05) * kRodRadius;
       const auto point = [&](double along) {
         std::ostringstream at;
         at << "[" << (layer % 2 ? across : along) << ", " << (layer % 2 ? along : across) << ", " << z << "]";
         return at.str();
       };
       text << "  - {name: rod_" << layer << "_" << k << ", centerline: {straight: {from: " << point(0.0)
-           << ", to: " << point(length) << ", edges: " << 3 * (rods + 1) << "}}, cross_section: {radius: " << kRadius
+           << ", to: " << point(length) << ", edges: " << 3 * (rods + 1) << "}}, cross_section: {radius: " << kRodRadius
            << "}, material: {density: 1100, youngs_modulus: 2.0e6, poissons_ratio: 0.4}, contact: {friction: 0.3}}\n";
     }
   return text.str();

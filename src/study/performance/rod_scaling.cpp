@@ -16,7 +16,7 @@ namespace slender::study {
 namespace {
 
 /// Seconds, fastest of several runs.
-struct Cost
+struct IterationCost
 {
   double gradient = std::numeric_limits<double>::infinity();   ///< frames and gradient
   /// frames, gradient, Hessian, factorisation, forward substitution
@@ -39,7 +39,7 @@ RodSetup rope(int nodes)
 }
 
 /// Whole implicit Euler steps of 1 ms: predictor, iterations, wrenches and copies of the state included.
-void timeSteps(RodSetup& rod, int repeats, int steps, Cost& cost)
+void timeSteps(RodSetup& rod, int repeats, int steps, IterationCost& cost)
 {
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1e-3));
   int iterations = 0;
@@ -61,7 +61,7 @@ void timeSteps(RodSetup& rod, int repeats, int steps, Cost& cost)
 }
 
 /// The parts of one Newton iteration, as dynamics/newton.h goes through them, at the state that the rope has reached.
-void timeParts(const RodSetup& rod, int repeats, Cost& cost)
+void timeIterationParts(const RodSetup& rod, int repeats, IterationCost& cost)
 {
   RodSystem system(*rod.model);
   system.load(rod.state);
@@ -126,11 +126,11 @@ void runRodScaling(StudyContext& context)
   for (const int nodes : sizes)
   {
     context.progress(done++, static_cast<int>(sizes.size()), std::to_string(nodes) + " nodes");
-    Cost cost;
+    IterationCost cost;
     const int work = context.quick() ? 400000 : 2000000;   // node-iterations per batch
     RodSetup rod = rope(nodes);
     timeSteps(rod, context.quick() ? 3 : 5, std::clamp(work / nodes / 5, 3, 400), cost);
-    timeParts(rod, std::clamp(work / nodes, 10, 4000), cost);
+    timeIterationParts(rod, std::clamp(work / nodes, 10, 4000), cost);
     const double total = cost.total(), per_node = 1e6 / nodes;
     const double band = cost.assemble - cost.gradient;
     context.row()

@@ -20,7 +20,7 @@ constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
 /// A row of the thesis's table, and a scene with as many vertices and the same step. Its materials are not given there:
 /// ours are such that explicit steps of that length are stable.
-struct Example
+struct RodExample
 {
   const char* figure;
   const char* what;
@@ -31,7 +31,7 @@ struct Example
   const char* scene;
 };
 
-const Example kExamples[] = {
+const RodExample kRodExamples[] = {
     {"4.1", "knot", 60, 4.0, 0.026, 0.05, 0.021, 0.21, 0.31, 250, R"(
 rods:
   - centerline: {straight: {from: [0, 0, 0], to: [0.6, 0, 0], edges: 59}}
@@ -137,7 +137,7 @@ double timeOf(int repeats, const std::function<void()>& work)
   return best;
 }
 
-void advance(Simulation& simulation, int steps, const std::string& what)
+void advanceScene(Simulation& simulation, int steps, const std::string& what)
 {
   for (int k = 0; k < steps; ++k)
   {
@@ -147,15 +147,15 @@ void advance(Simulation& simulation, int steps, const std::string& what)
   }
 }
 
-struct Parts
+struct RodTimes
 {
   double forces = 0, quasistatic = 0;   ///< [s] of all rods
 };
 
 /// Forces and frames of every rod at the state reached.
-Parts timeParts(const Simulation& simulation, int repeats)
+RodTimes rodTimes(const Simulation& simulation, int repeats)
 {
-  Parts parts;
+  RodTimes parts;
   for (std::size_t r = 0; r < simulation.state().rods.size(); ++r)
   {
     const RodModel& model = simulation.rodModel(static_cast<int>(r));
@@ -187,7 +187,7 @@ Parts timeParts(const Simulation& simulation, int repeats)
   return parts;
 }
 
-Simulation make(const Example& e, Integrator integrator, bool with_contact)
+Simulation make(const RodExample& e, Integrator integrator, bool with_contact)
 {
   SceneConfig config = parseScene(e.scene, std::string("table_4_1/") + e.figure);
   config.time.step = 1e-3 * e.step;
@@ -203,16 +203,16 @@ Simulation make(const Example& e, Integrator integrator, bool with_contact)
 void runRodTables(StudyContext& context)
 {
   int done = 0;
-  const int count = static_cast<int>(std::size(kExamples)), batch = context.quick() ? 20 : 200;
+  const int count = static_cast<int>(std::size(kRodExamples)), batch = context.quick() ? 20 : 200;
   double least = std::numeric_limits<double>::infinity();
   int most_iterations = 0, most_apart = 0;
-  for (const Example& e : kExamples)
+  for (const RodExample& e : kRodExamples)
   {
     context.progress(done++, count, e.what);
     const bool contact = std::isfinite(e.contact);
     const std::string name = std::string("figure ") + e.figure;
     const auto timeSteps = [&](Simulation& simulation) {
-      return timeOf(3, [&] { advance(simulation, batch, name); }) / batch;
+      return timeOf(3, [&] { advanceScene(simulation, batch, name); }) / batch;
     };
     const int settling = context.quick() ? e.settling / 10 : e.settling;
 
@@ -220,10 +220,10 @@ void runRodTables(StudyContext& context)
     int vertices = 0;
     for (const RodState& rod : simulation.state().rods)
       vertices += static_cast<int>(rod.x.cols());
-    advance(simulation, settling, name);
+    advanceScene(simulation, settling, name);
     StepReport report = simulation.step(simulation.defaultInputs());
     const double total = timeSteps(simulation);
-    const Parts parts = timeParts(simulation, 50);
+    const RodTimes parts = rodTimes(simulation, 50);
     Row& row = context.row();
     row.set("figure", e.figure)
         .set("example", e.what)
@@ -239,7 +239,7 @@ void runRodTables(StudyContext& context)
     {
       // the same steps from the same state without contact
       Simulation free = make(e, Integrator::implicit_euler, false);
-      advance(free, settling, name);
+      advanceScene(free, settling, name);
       contact_time = 1e3 * std::max(0.0, total - timeSteps(free));
       quasistatic = kAbsent;   // angles are unknowns of the implicit step
     }

@@ -13,7 +13,7 @@ namespace slender::study {
 namespace {
 
 /// The coil of the study `coiling` at H = 2.03: Omega = 1.568, R = 0.3945.
-constexpr double kHeight = 2.02881, kFrequency = 1.56845, kRadius = 0.394542;
+constexpr double kHeight = 2.02881, kFrequency = 1.56845, kCoilRadius = 0.394542;
 
 ThreadSetup coilingThread()
 {
@@ -22,7 +22,7 @@ ThreadSetup coilingThread()
   m.density = 5e-4;
   m.viscosity = 0.2;
   m.nozzle_diameter = 0.09;
-  m.feed_length = 2 * M_PI * kRadius / 40;
+  m.feed_length = 2 * M_PI * kCoilRadius / 40;
   m.floor = {true, 0.0, false};
   m.limits.max_deposited = 80;
   ThreadSetup t = nozzleThread(m, {0, 0, kHeight}, 0.615);
@@ -111,10 +111,10 @@ void runThreadImplicitVsExplicit(StudyContext& context)
       if (same != other.state.id.end())
         away = std::max(away, (t.state.x[i] - other.state.x[same - other.state.id.begin()]).norm());
     }
-    const bool stable = away < 0.01 * kRadius;
+    const bool stable = away < 0.01 * kCoilRadius;
     row.set("outcome", stable ? "stable" : "rattles")
         .set("cpu_per_second", seconds)
-        .set("distance_from_implicit_over_R", away / kRadius);
+        .set("distance_from_implicit_over_R", away / kCoilRadius);
     if (!stable)
       continue;
     explicit_step = h;

@@ -12,10 +12,10 @@
 namespace slender::study {
 namespace {
 
-constexpr double kFrame = 1.0 / 24;   // [s]; the thesis names no rate, its step of 0.208 ms is 1/200 of this
+constexpr double kFilmFrame = 1.0 / 24;   // [s]; the thesis names no rate, its step of 0.208 ms is 1/200 of this
 
 /// A row of the thesis's table, and a scene with about as many vertices and the same step.
-struct Example
+struct ThreadExample
 {
   const char* figure;
   const char* what;
@@ -26,7 +26,7 @@ struct Example
   const char* scene;                  ///< null: the package's hair
 };
 
-const Example kExamples[] = {
+const ThreadExample kThreadExamples[] = {
     {"5.1", "sewing on a belt", "180", 10e-3, 0.241, 59.7, 16.8, 20.0, R"(
 threads:
   - fluid: {density: 1000, viscosity: 28, surface_tension: 0.021}
@@ -65,9 +65,9 @@ void runThreadTables(StudyContext& context)
   double least = std::numeric_limits<double>::infinity();
   int done = 0;
   double most_cut = 0.0;
-  for (const Example& e : kExamples)
+  for (const ThreadExample& e : kThreadExamples)
   {
-    context.progress(done++, static_cast<int>(std::size(kExamples)), e.what);
+    context.progress(done++, static_cast<int>(std::size(kThreadExamples)), e.what);
     const std::string step = "time.step=" + std::to_string(e.step);
     if (!e.scene && context.quick())
       continue;   // minutes
@@ -76,7 +76,7 @@ void runThreadTables(StudyContext& context)
     const double seconds = context.quick() ? 0.2 * e.seconds : e.seconds;
     double fastest = std::numeric_limits<double>::infinity(), slowest = 0.0, total = 0.0;
     int frames = 0, fewest = std::numeric_limits<int>::max(), most = 0, cuts = 0;
-    for (double frame = kFrame; frame <= seconds; frame += kFrame)
+    for (double frame = kFilmFrame; frame <= seconds; frame += kFilmFrame)
     {
       const double start = threadSeconds();
       while (simulation.state().time < frame)

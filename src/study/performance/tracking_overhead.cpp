@@ -10,14 +10,14 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kStep = 0.01;    // [s]
-constexpr int kRepeats = 3;       // of each step that is timed, from the same state; the quickest counts
-constexpr double kEqual = 1.05;   // ratio of errors that counts as equal
-constexpr int kMostPasses = 10;   // to get there
-constexpr double kExact = 1e-9;   // tolerance of the linear solver in steps that others are compared with
+constexpr double kTrackedStep = 0.01;   // [s]
+constexpr int kRepeats = 3;             // of each step that is timed, from the same state; the quickest counts
+constexpr double kEqual = 1.05;         // ratio of errors that counts as equal
+constexpr int kMostPasses = 10;         // to get there
+constexpr double kExact = 1e-9;         // tolerance of the linear solver in steps that others are compared with
 
 /// Sums over the steps of a run.
-struct Cost
+struct StepCost
 {
   double seconds = 0, square = 0;
   int linear_iterations = 0, steps = 0, compared = 0;
@@ -32,7 +32,7 @@ struct Cost
 class Solver
 {
 public:
-  Cost cost;
+  StepCost cost;
 
   Solver(const std::shared_ptr<const ClothModel>& model, ClothOptions options, bool collides)
     : stepper_(model, options),
@@ -74,7 +74,7 @@ public:
     if (compares)
     {
       ClothState solved = from;
-      if (!exact_.step(solved, inputs, kStep).ok)
+      if (!exact_.step(solved, inputs, kTrackedStep).ok)
         throw std::runtime_error("tracking_overhead: a step with an exact linear solver failed");
       cost.square += (end.x - solved.x).squaredNorm() / static_cast<double>(end.x.cols());
       ++cost.compared;
@@ -86,10 +86,10 @@ private:
   StepReport advance(ClothState& state, const ClothInputs& inputs)
   {
     if (!group_)
-      return stepper_.step(state, inputs, kStep);
+      return stepper_.step(state, inputs, kTrackedStep);
     group_state_.cloths = {state};
     group_inputs_.cloths[0] = inputs;
-    const StepReport report = group_->step(group_state_, group_inputs_, kStep);
+    const StepReport report = group_->step(group_state_, group_inputs_, kTrackedStep);
     state = group_state_.cloths[0];
     return report;
   }
@@ -100,9 +100,9 @@ private:
   ClothGroupInputs group_inputs_;
 };
 
-struct Costs
+struct TrackingCosts
 {
-  Cost tracked, beside, alone;   ///< beside: free steps from the tracked cloth's states; alone: of a free run
+  StepCost tracked, beside, alone;   ///< beside: free steps from the tracked cloth's states; alone: of a free run
 };
 
 enum class Purpose
@@ -112,7 +112,7 @@ enum class Purpose
   times_with_collisions
 };
 
-Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int steps, Purpose purpose)
+TrackingCosts run(StudyContext& context, const TrackedCase& c, double tolerance, int steps, Purpose purpose)
 {
   const bool collides = purpose == Purpose::times_with_collisions;
   auto free_model = std::make_shared<ClothModel>(*c.model);
@@ -132,7 +132,7 @@ Costs run(StudyContext& context, const TrackedCase& c, double tolerance, int ste
       context.progress(i, steps, c.name);
     // what stays is factored in the first one
     const bool counts = i > 0, compares = counts && !collides && i % 5 == 0;
-    inputs.averages = c.constraints->averages(c.motion((i + 1) * kStep));
+    inputs.averages = c.constraints->averages(c.motion((i + 1) * kTrackedStep));
     const int repeats = counts && purpose != Purpose::errors ? kRepeats : 1;
     beside.step(state, free_inputs, counts, compares, repeats);
     if (purpose == Purpose::times)
@@ -156,15 +156,15 @@ void runTrackingOverhead(StudyContext& context)
     double tolerance = usual;
     for (int pass = 0; pass < kMostPasses; ++pass)
     {
-      const Costs costs = run(context, c, tolerance, steps, Purpose::errors);
+      const TrackingCosts costs = run(context, c, tolerance, steps, Purpose::errors);
       const double ratio = costs.tracked.error() / costs.beside.error();
       if (ratio <= kEqual)
         break;
       tolerance /= std::min(ratio, 2.0);
     }
-    const Costs costs = run(context, c, tolerance, steps, Purpose::times);
-    const Cost &tracked = costs.tracked, &beside = costs.beside, &alone = costs.alone;
-    const Costs colliding = run(context, c, tolerance, steps / 2, Purpose::times_with_collisions);
+    const TrackingCosts costs = run(context, c, tolerance, steps, Purpose::times);
+    const StepCost &tracked = costs.tracked, &beside = costs.beside, &alone = costs.alone;
+    const TrackingCosts colliding = run(context, c, tolerance, steps / 2, Purpose::times_with_collisions);
     const double overhead = tracked.seconds / beside.seconds - 1, run_overhead = tracked.seconds / alone.seconds - 1;
     worst = std::max(worst, overhead);
     const double colliding_overhead = colliding.tracked.seconds / colliding.beside.seconds - 1;

@@ -62,13 +62,13 @@ double aspectRatio(const RodSetup& rod) { return -rod.tip().z() / rod.tip().x();
 /// Lowest frequency, roughly: a beam for small loads, a heavy chain for large ones.
 double slowestRate(double gamma) { return std::sqrt(3.5 * 3.5 + 1.45 * gamma); }
 
-struct Outcome
+struct CantileverShape
 {
   double ratio, seconds;   ///< ratio: NaN when refused
   std::string refused;
 };
 
-Outcome runStatic(double gamma, const Eigen::Matrix3Xd& nodes)
+CantileverShape runStatic(double gamma, const Eigen::Matrix3Xd& nodes)
 {
   RodSetup rod = heavyRod(gamma, nodes, 0.0);
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
@@ -79,7 +79,7 @@ Outcome runStatic(double gamma, const Eigen::Matrix3Xd& nodes)
 }
 
 /// Released horizontally and damped (critically in its slowest mode) until it stands still.
-Outcome runSettled(double gamma, int edges)
+CantileverShape runSettled(double gamma, int edges)
 {
   const double rate = slowestRate(gamma);
   RodSetup rod = heavyRod(gamma, evenNodes(edges), 2 * rate);
@@ -138,9 +138,9 @@ void runCantilever(StudyContext& context)
           continue;
         if (how == How::graded && layerEdges(gamma, n) >= kLayerEdges)
           continue;   // equal edges are as short
-        const Outcome o = how == How::settled
-                              ? runSettled(gamma, n)
-                              : runStatic(gamma, how == How::graded ? gradedNodes(gamma, n) : evenNodes(n));
+        const CantileverShape o = how == How::settled
+                                      ? runSettled(gamma, n)
+                                      : runStatic(gamma, how == How::graded ? gradedNodes(gamma, n) : evenNodes(n));
         const double relative = o.ratio / expected - 1;
         const bool resolved = how == How::graded || layerEdges(gamma, n) >= kLayerEdges;
         Row& row = context.row();

@@ -14,17 +14,18 @@ namespace slender::study {
 namespace {
 
 /// greenhill.csv: tension T L^2/B and the torque M L/B at which a rod with clamped ends buckles.
-struct Threshold
+struct TorqueThreshold
 {
   double tension, torque;
 };
-constexpr Threshold kThresholds[] = {{-30, 3.800429623}, {-20, 5.771135703}, {-10, 7.451015644}, {-5, 8.232810781},
-                                     {0, 8.986818916},   {1, 9.134730089},   {5, 9.717747733},   {10, 10.42885644},
-                                     {20, 11.80032954},  {50, 15.58932393},  {100, 20.98350083}, {200, 28.98273785}};
-constexpr double kStretch = 1e7;
+constexpr TorqueThreshold kTorqueThresholds[] = {{-30, 3.800429623}, {-20, 5.771135703}, {-10, 7.451015644},
+                                                 {-5, 8.232810781},  {0, 8.986818916},   {1, 9.134730089},
+                                                 {5, 9.717747733},   {10, 10.42885644},  {20, 11.80032954},
+                                                 {50, 15.58932393},  {100, 20.98350083}, {200, 28.98273785}};
+constexpr double kShaftStretch = 1e7;
 /// the threshold does not depend on it, but joints that twist far do: the mean of both edges' curvatures (3.14) is
 /// cos(m/2) of either, m the joint's twist
-constexpr double kTwist = 2.0;
+constexpr double kShaftTwist = 2.0;
 constexpr double kSoftTwist = 1 / 1.3;
 
 /// B = L = 1. One clamp is free to slide in the reference; for small deflections sliding does not matter.
@@ -32,13 +33,13 @@ bool isStable(int edges, double twist, Curvature curvature, double tension, doub
 {
   RodCase rod_case;
   rod_case.edges = edges;
-  rod_case.stretch = kStretch;
+  rod_case.stretch = kShaftStretch;
   rod_case.twist = twist;
   RodSetup rod = straightRod(rod_case, torque / twist);
   auto model = std::make_shared<RodModel>(*rod.model);
   model->curvature = curvature;   // of a straight rod, whose rest curvatures are zero either way
   rod.model = model;
-  rod.state.x *= 1.0 + tension / kStretch;
+  rod.state.x *= 1.0 + tension / kShaftStretch;
   rod.hold(0, 0, true);
   rod.hold(edges, edges, true);
   // a straight rod stays straight: only its frames look for their equilibrium
@@ -56,7 +57,7 @@ bool isStable(int edges, double twist, Curvature curvature, double tension, doub
   return unstableModes(*rod.model, rod.state, Eigen::Vector3d::Zero()) == 0;
 }
 
-double threshold(int edges, double twist, const Threshold& t, Curvature curvature = Curvature::tangent)
+double threshold(int edges, double twist, const TorqueThreshold& t, Curvature curvature = Curvature::tangent)
 {
   double stable = 0.3 * t.torque, unstable = 1.7 * t.torque;
   for (int i = 0; i < 40; ++i)
@@ -67,9 +68,9 @@ double threshold(int edges, double twist, const Threshold& t, Curvature curvatur
   return 0.5 * (stable + unstable);
 }
 
-constexpr Threshold kPinned[] = {{-5, 4.413436032}, {0, 6.283185307},   {1, 6.593816619},
-                                 {5, 7.712225204},  {10, 8.915066887},  {20, 10.93061835},
-                                 {50, 15.47509023}, {100, 20.96374054}, {200, 28.97375394}};
+constexpr TorqueThreshold kPinned[] = {{-5, 4.413436032}, {0, 6.283185307},   {1, 6.593816619},
+                                       {5, 7.712225204},  {10, 8.915066887},  {20, 10.93061835},
+                                       {50, 15.47509023}, {100, 20.96374054}, {200, 28.97375394}};
 
 /// Pinned ends whose torque keeps its direction have no potential (a grasp cannot be that): equilibrium in the rod's
 /// forces and the couples M (e_x x t) that the torque puts on the end edges. Linear in small deflections w = y + i z of
@@ -141,7 +142,7 @@ double pinnedThreshold(int edges, double tension, double guess)
 void addPinned(StudyContext& context)
 {
   for (const int edges : context.quick() ? std::vector<int>{100} : std::vector<int>{50, 100})
-    for (const Threshold& t : kPinned)
+    for (const TorqueThreshold& t : kPinned)
     {
       context.progress(0, 1, "pinned, n = " + std::to_string(edges));
       const double torque = pinnedThreshold(edges, t.tension, 0.8 * t.torque);
@@ -165,11 +166,11 @@ void runGreenhill(StudyContext& context)
   int done = 0;
   double coarse = 0, fine = 0;
   for (const int edges : meshes)
-    for (const Threshold& t : kThresholds)
+    for (const TorqueThreshold& t : kTorqueThresholds)
     {
-      context.progress(done++, static_cast<int>(meshes.size() * std::size(kThresholds)),
+      context.progress(done++, static_cast<int>(meshes.size() * std::size(kTorqueThresholds)),
                        "n = " + std::to_string(edges));
-      const double torque = threshold(edges, kTwist, t);
+      const double torque = threshold(edges, kShaftTwist, t);
       Row& row = context.row();
       row.set("n", edges).set("TL2_over_B", t.tension).set("relative_error", torque / t.torque - 1);
       if (edges >= 100)
@@ -184,7 +185,7 @@ void runGreenhill(StudyContext& context)
         plot.at("exact").y.push_back(t.torque);
       }
     }
-  for (const Threshold& t : kThresholds)
+  for (const TorqueThreshold& t : kTorqueThresholds)
   {
     context.row()
         .set("n", 100)

@@ -11,8 +11,6 @@
 namespace slender::study {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// A rod of the thesis's experiment and what is known of it.
 struct Case
 {
@@ -32,14 +30,14 @@ constexpr Discrete kDiscrete[] = {{100, 0.7535229518, 14.27727667}, {150, 0.8276
                                   {400, 0.902827241, 14.25438358},  {600, 0.9113978407, 14.25309228}};
 
 /// Infinite rod [van der Heijden & Thompson 2000]: D = (4 alpha/M) sin phi0, R = M L/beta + 2 phi0.
-struct Helix
+struct LocalisedHelix
 {
   double peak, moment;
 };
-Helix exactHelix(const Case& c)
+LocalisedHelix exactHelix(const Case& c)
 {
-  const double turn = 2 * kPi * c.turns;
-  double low = 0.0, high = 0.5 * kPi;
+  const double turn = 2 * M_PI * c.turns;
+  double low = 0.0, high = 0.5 * M_PI;
   const auto moment = [&](double peak) { return (turn - 2 * peak) * c.beta / c.length; };
   for (int i = 0; i < 100; ++i)
   {
@@ -52,7 +50,7 @@ Helix exactHelix(const Case& c)
 /// Nodes of the exact helix, pinned into the clamps' distance: a start for the equilibrium.
 Eigen::Matrix3Xd helixNodes(const Case& c, const Eigen::VectorXd& fractions)
 {
-  const Helix h = exactHelix(c);
+  const LocalisedHelix h = exactHelix(c);
   const double scale = h.moment / (2 * c.alpha) * std::tan(0.5 * h.peak);   // 1 / s*
   const int fine = 20000;
   const double ds = c.length / fine;
@@ -74,14 +72,14 @@ Eigen::Matrix3Xd helixNodes(const Case& c, const Eigen::VectorXd& fractions)
   return resampleCurve(points, false, fractions);
 }
 
-struct Result
+struct BuckledRod
 {
   double peak = 0, moment = 0, envelope_error = 0;
   std::vector<double> s, envelope;   ///< about the peak
 };
 
 /// Equilibrium on a mesh whose second half has edges 1 / refinement as long.
-Result solve(const Case& c, int edges, double refinement, Curvature curvature)
+BuckledRod solve(const Case& c, int edges, double refinement, Curvature curvature)
 {
   Eigen::VectorXd lengths(edges);
   const int first = refinement == 1 ? edges : static_cast<int>(std::lround(edges / (1 + refinement)));
@@ -98,13 +96,13 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
   // The frames of an isotropic rod may be chosen freely: with the turns as rest twist of the opposite sign they hardly
   // twist, and joints do not feel that the mean of both edges' curvatures (3.14) is cos(m/2) of either. Compensated
   // ones need no such help.
-  const double untwisted = curvature == Curvature::tangent ? 2 * kPi * c.turns : 0.0;
+  const double untwisted = curvature == Curvature::tangent ? 2 * M_PI * c.turns : 0.0;
   auto model = std::make_shared<RodModel>(*rod.model);
   for (int i = 0; i <= edges; ++i)
     model->rest_twist[i] =
         -untwisted * 0.5 * ((i > 0 ? lengths[i - 1] : 0.0) + (i < edges ? lengths[i] : 0.0)) / c.length;
   rod.model = model;
-  const Helix exact = exactHelix(c);
+  const LocalisedHelix exact = exactHelix(c);
   const Eigen::Matrix3Xd start = helixNodes(c, fractions);
   rod.state = makeRodState(*rod.model, start, Eigen::Vector3d::UnitY(), exact.moment * c.length / c.beta - untwisted);
   rod.hold(0, 0, true);
@@ -121,7 +119,7 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
   RodStepper stepper(rod.model, time);
   require(stepper.solveEquilibrium(rod.state, rod.inputs), "helical buckling, n = " + std::to_string(edges));
 
-  Result result;
+  BuckledRod result;
   result.moment = std::abs(stepper.wrenches()[0].torque.x());
   std::vector<double> phi(edges), middle(edges);
   double at = 0;
@@ -155,7 +153,7 @@ Result solve(const Case& c, int edges, double refinement, Curvature curvature)
 /// The same rods with compensated joints, against the continuum.
 void runCompensated(StudyContext& context, Plot& errors)
 {
-  const Helix exact = exactHelix(kThesis);
+  const LocalisedHelix exact = exactHelix(kThesis);
   const std::vector<int> meshes =
       context.quick() ? std::vector<int>{50, 100, 200} : std::vector<int>{50, 70, 100, 150, 200, 300, 400, 600};
   for (const double refinement : {1.0, 2.0})
@@ -164,7 +162,7 @@ void runCompensated(StudyContext& context, Plot& errors)
       if (refinement == 2 && edges < 100)
         continue;
       context.progress(edges, 600, "compensated, " + std::to_string(edges) + " edges");
-      const Result r = solve(kThesis, edges, refinement, Curvature::compensated);
+      const BuckledRod r = solve(kThesis, edges, refinement, Curvature::compensated);
       const std::string name = refinement == 1 ? "compensated" : "compensated, one half twice as fine";
       const double relative = r.peak / exact.peak - 1;
       Row& row = context.row();
@@ -194,7 +192,7 @@ void runHelicalBuckling(StudyContext& context)
   envelope.log_x = envelope.log_y = false;
   Plot& errors = context.plot("helical_buckling_error", "Localised helical buckling: error of the maximal deviation",
                               "edges", "relative error of phi0");
-  const Helix exact = exactHelix(kThesis);
+  const LocalisedHelix exact = exactHelix(kThesis);
   std::vector<double> n, error;
   int done = 0;
   const int total = context.quick() ? 4 : 12;
@@ -203,7 +201,7 @@ void runHelicalBuckling(StudyContext& context)
     if (context.quick() && d.edges > 200)
       continue;
     context.progress(done++, total, std::to_string(d.edges) + " edges");
-    const Result r = solve(kThesis, d.edges, 1, Curvature::tangent);
+    const BuckledRod r = solve(kThesis, d.edges, 1, Curvature::tangent);
     const double relative = r.peak / exact.peak - 1;
     Row& row = context.row();
     row.set("case", "uniform")
@@ -239,7 +237,7 @@ void runHelicalBuckling(StudyContext& context)
   for (const int edges : context.quick() ? std::vector<int>{150} : std::vector<int>{150, 300, 600})
   {
     context.progress(done++, total, "half refined, " + std::to_string(edges) + " edges");
-    const Result r = solve(kThesis, edges, 2, Curvature::tangent);
+    const BuckledRod r = solve(kThesis, edges, 2, Curvature::tangent);
     context.row()
         .set("case", "one half twice as fine")
         .set("n", edges)
@@ -262,8 +260,8 @@ void runHelicalBuckling(StudyContext& context)
   context.note(
       "order: from n = 600 to 1200. From 200 to 600 the table's own equilibria give 1.88: their error n^2 still grows "
       "there.");
-  const Helix peer = exactHelix(kPeer);
-  const Result r = solve(kPeer, 1000, 1, Curvature::tangent);
+  const LocalisedHelix peer = exactHelix(kPeer);
+  const BuckledRod r = solve(kPeer, 1000, 1, Curvature::tangent);
   context.row()
       .set("case", "L = 100, slack 3")
       .set("n", 1000)

@@ -16,15 +16,15 @@ namespace {
 
 /// A rod, and the smooth solution of its clamped-clamped boundary-value problem (helix_summary.csv: phi0_finite,
 /// M3_finite).
-struct Helix
+struct HelixCase
 {
   const char* name;
   double length, alpha, beta, turns, shortening, peak, moment;
 };
-constexpr Helix kShipped{"shipped", 9.29, 1.345, 0.789, 27, 0.3, 0.9185498494, 14.25201565};
-constexpr Helix kHelices[] = {{"D02", 9.29, 1.345, 0.789, 27, 0.2, 0.5610876374, 14.3127407},
-                              {"D01", 9.29, 1.345, 0.789, 27, 0.1, 0.2770050604, 14.36210465},
-                              {"short", 4, 1, 1, 5, 0.4, 0.8641947329, 7.431150286}};
+constexpr HelixCase kShipped{"shipped", 9.29, 1.345, 0.789, 27, 0.3, 0.9185498494, 14.25201565};
+constexpr HelixCase kHelices[] = {{"D02", 9.29, 1.345, 0.789, 27, 0.2, 0.5610876374, 14.3127407},
+                                  {"D01", 9.29, 1.345, 0.789, 27, 0.1, 0.2770050604, 14.36210465},
+                                  {"short", 4, 1, 1, 5, 0.4, 0.8641947329, 7.431150286}};
 
 /// What the scene ends with.
 struct Reached
@@ -33,7 +33,7 @@ struct Reached
   double speed = 0;   ///< of the fastest node [m/s]
 };
 
-std::string number(double value)
+std::string exactText(double value)
 {
   char text[40];
   std::snprintf(text, sizeof text, "%.17g", value);
@@ -41,14 +41,14 @@ std::string number(double value)
 }
 
 /// Values of the shipped scene that make it the scene of another rod.
-std::vector<std::string> overridesOf(const Helix& h, int edges)
+std::vector<std::string> overridesOf(const HelixCase& h, int edges)
 {
-  return {"rods.0.centerline.straight.to=[" + number(h.length) + ", 0, 0]",
+  return {"rods.0.centerline.straight.to=[" + exactText(h.length) + ", 0, 0]",
           "rods.0.centerline.straight.edges=" + std::to_string(edges),
-          "rods.0.initial_twist=" + number(2 * M_PI * h.turns),
-          "rods.0.material.bend_modulus=" + number(h.alpha),
-          "rods.0.material.twist_modulus=" + number(h.beta),
-          "rods.0.grasps.right.motion.table.1.1=" + number(-h.shortening)};
+          "rods.0.initial_twist=" + exactText(2 * M_PI * h.turns),
+          "rods.0.material.bend_modulus=" + exactText(h.alpha),
+          "rods.0.material.twist_modulus=" + exactText(h.beta),
+          "rods.0.grasps.right.motion.table.1.1=" + exactText(-h.shortening)};
 }
 
 /// The largest angle between the rod and its axis, by a parabola through the three steepest edges. The angle does not
@@ -86,7 +86,8 @@ struct Worst
   double peak = 0, moment = 0;
 };
 
-void check(StudyContext& context, const std::string& name, int edges, const Helix& h, const Reached& r, Worst& worst)
+void check(StudyContext& context, const std::string& name, int edges, const HelixCase& h, const Reached& r,
+           Worst& worst)
 {
   const double peak_error = r.peak / h.peak - 1, moment_error = r.moment / h.moment - 1;
   // The bounds are those that were asked for at n = 200. The error falls with 1/n^2.
@@ -124,7 +125,7 @@ void runHelicalScene(StudyContext& context)
   context.progress(done++, total, "the shipped scene with 200 edges");
   const Reached shipped = simulate({"rods.0.centerline.straight.edges=200"});
   check(context, "shipped", kEdges, kShipped, shipped, worst);
-  for (const Helix& h : kHelices)
+  for (const HelixCase& h : kHelices)
   {
     if (context.quick() && std::string(h.name) != "short")
       continue;

@@ -15,13 +15,13 @@ namespace {
 
 /// Exact thresholds of the inextensible rod, its sag included (lateral_rod_ellipse.csv,
 /// lateral_rod_ellipse_saint_venant.csv).
-struct Threshold
+struct WeightThreshold
 {
   bool polar;   ///< twist modulus G A (a^2+b^2)/4, or else Saint-Venant's G pi a^3 b^3/(a^2+b^2)
   double nu, a_over_b;
   double gamma;   ///< rho A g L^3 / A1, A1 the weak bending modulus; 0: none up to a tip angle of 86 degrees
 };
-constexpr Threshold kThresholds[] = {
+constexpr WeightThreshold kWeightThresholds[] = {
     {true, 0, 1.5, 0},           {true, 0, 2, 0},
     {true, 0, 3, 139.48574},     {true, 0, 4, 92.043172},
     {true, 0, 5, 97.251857},     {true, 0, 7, 121.11371},
@@ -54,7 +54,7 @@ constexpr double kGrading = 5;   ///< of the meshes that resolve the clamp: last
 class HeavyCantilever
 {
 public:
-  HeavyCantilever(const Threshold& t, int edges, double grading) : edges_(edges)
+  HeavyCantilever(const WeightThreshold& t, int edges, double grading) : edges_(edges)
   {
     const double r2 = t.a_over_b * t.a_over_b;
     const double twist = (t.polar ? 0.5 * (1 + r2) : 2 * r2 / (1 + r2)) / (1 + t.nu);
@@ -134,8 +134,8 @@ void runLateralBuckling(StudyContext& context)
                                     "a / b", "Gamma_c = rho A g L^3 / A1");
   int done = 0;
   double worst_uniform = 0, order = std::numeric_limits<double>::infinity();
-  const int total = static_cast<int>(2 * std::size(kThresholds) * meshes.size());
-  for (const Threshold& t : kThresholds)
+  const int total = static_cast<int>(2 * std::size(kWeightThresholds) * meshes.size());
+  for (const WeightThreshold& t : kWeightThresholds)
   {
     char label[80], nu[32];
     std::snprintf(label, sizeof label, "%s, nu = %g, a/b = %g", t.polar ? "polar" : "Saint-Venant", t.nu, t.a_over_b);

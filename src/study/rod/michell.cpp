@@ -13,8 +13,6 @@
 namespace slender::study {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// Ring of radius 1 with bending modulus 1. The imposed twist is a rest twist of the opposite sign: a closed rod turned
 /// by any angle before its ends were joined.
 class Ring
@@ -25,7 +23,7 @@ public:
     Eigen::Matrix3Xd nodes(3, edges);
     const double radius = 1.0;
     for (int i = 0; i < edges; ++i)
-      nodes.col(i) = radius * Eigen::Vector3d(std::cos(2 * kPi * i / edges), std::sin(2 * kPi * i / edges), 0);
+      nodes.col(i) = radius * Eigen::Vector3d(std::cos(2 * M_PI * i / edges), std::sin(2 * M_PI * i / edges), 0);
     const RodSection section{0.01, 0.01, 1.0, 1e6, Eigen::Matrix2d::Identity(), beta};
     model_ = buildRod("ring", nodes, true, std::vector<RodSection>(edges, section), Eigen::Vector3d::UnitZ(), true,
                       {curvature, false});
@@ -42,7 +40,7 @@ public:
     system.load(state_);
     system.setResponse(0.0, nullptr);
     for (int i = 0; i < edges_; ++i)
-      system.setInertia(i, 1e-6 * 2 * kPi / edges_, state_.x.col(i), Eigen::Vector3d::Zero());
+      system.setInertia(i, 1e-6 * 2 * M_PI / edges_, state_.x.col(i), Eigen::Vector3d::Zero());
     return system.evaluate(true).inertia.positiveDefinite();
   }
 
@@ -53,7 +51,7 @@ public:
     Eigen::MatrixXd modes(3 * edges_, 6);
     for (int i = 0; i < edges_; ++i)
     {
-      const double phi = 2 * kPi * i / edges_;
+      const double phi = 2 * M_PI * i / edges_;
       const Eigen::Vector3d axes[3] = {
           {std::cos(phi), std::sin(phi), 0}, {-std::sin(phi), std::cos(phi), 0}, {0, 0, 1}};
       for (int k = 0; k < 3; ++k)
@@ -94,7 +92,7 @@ public:
     RodState state = state_;
     const double size = 1e-4;
     for (int i = 0; i < edges_; ++i)
-      state.x(2, i) = size * std::cos(4 * kPi * i / edges_);
+      state.x(2, i) = size * std::cos(4 * M_PI * i / edges_);
     const Eigen::Matrix3Xd nodes = state.x;
     state = makeRodState(*model, nodes, Eigen::Vector3d::UnitZ());
     RodInputs inputs;
@@ -145,7 +143,7 @@ void runMichell(StudyContext& context)
     {
       const double beta = 0.5 + step * k;
       context.progress(done++, points * 2, "n = " + std::to_string(edges));
-      const double smooth = 2 * kPi * std::sqrt(3.0) / beta, expected = smooth * (1 + 31.3 / (edges * edges));
+      const double smooth = 2 * M_PI * std::sqrt(3.0) / beta, expected = smooth * (1 + 31.3 / (edges * edges));
       Ring ring(edges, beta, Curvature::tangent);
       const double stable = ring.threshold(expected, false), isotropic = ring.threshold(expected, true);
       const auto row = [&](const char* formulation) -> Row& {

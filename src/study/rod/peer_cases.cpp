@@ -9,8 +9,6 @@
 namespace slender::study {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 RodSetup settled(RodSetup rod, const std::string& what)
 {
   RodStepper stepper(rod.model, timeConfig(Integrator::implicit_euler, 1.0, 1e-9));
@@ -26,7 +24,7 @@ Eigen::Vector3d bentCantilever(int edges)
                twist = 0.5 * youngs * 0.140577 * std::pow(side, 4);
   RodSection section = sectionOf(youngs * side * side, bend, bend, twist);
   // from the origin along y, towards +x
-  const Eigen::Matrix3Xd arc = arcCurve({1, 0, 0}, {0, 0, 0}, {0, 0, -1}, 0.25 * kPi, edges);
+  const Eigen::Matrix3Xd arc = arcCurve({1, 0, 0}, {0, 0, 0}, {0, 0, -1}, 0.25 * M_PI, edges);
   RodSetup rod = naturalRod(section, arc, Eigen::Vector3d::UnitZ());
   rod.hold(0, 0, true);
   rod.inputs.gravity.setZero();

@@ -14,8 +14,8 @@
 namespace slender::study {
 namespace {
 
-constexpr double kTurns = 12, kThin = 1.0, kWide = 9.0, kTwist = 1.8 / 1.3;   // section 3 : 1, nu = 0.3; L = 1
-constexpr double kStretch = 1e8;
+constexpr double kTurns = 12, kThin = 1.0, kWide = 9.0, kRibbonTwist = 1.8 / 1.3;   // section 3 : 1, nu = 0.3; L = 1
+constexpr double kRibbonStretch = 1e8;
 constexpr double kPitch = 0.003;   ///< [rad] a Slinky of 0.7 mm steel on a radius of 34 mm: turn on turn
 
 /// Natural shape: a helix of kTurns turns whose thin direction d1 points to its axis.
@@ -32,7 +32,7 @@ struct Ribbon
     torsion = std::sin(pitch_angle) * std::cos(pitch_angle) / radius;
     natural = helixCurve({0, 0, 0}, Eigen::Vector3d::UnitX(), radius, std::sin(pitch_angle) / kTurns, kTurns, edges);
     const Eigen::Matrix3Xd straight = straightCurve({0, 0, 0}, {1, 0, 0}, edges);
-    const std::vector<RodSection> sections(edges, sectionOf(kStretch, kThin, kWide, kTwist));
+    const std::vector<RodSection> sections(edges, sectionOf(kRibbonStretch, kThin, kWide, kRibbonTwist));
     RodModel model = buildRod("ribbon", straight, false, sections, Eigen::Vector3d::UnitZ(), true);
     for (int i = 0; i <= edges; ++i)
     {
@@ -55,7 +55,7 @@ struct Ribbon
   /// Straight and untwisted, with this tension: what fingers travelling along the ribbon leave behind.
   void drawFlat(double tension)
   {
-    const double end = 1 + tension / kStretch;
+    const double end = 1 + tension / kRibbonStretch;
     lay(rod, straightCurve({0, 0, 0}, {end, 0, 0}, rod.model->edges()), Eigen::Vector3d::UnitZ());
     rod.state.grasps[1].X_WG.position = rod.inputs.grasps[1].X_WG.position = {end, 0, 0};
   }
@@ -63,7 +63,10 @@ struct Ribbon
 
 /// Tension at which the clamped flat ribbon buckles: B z'''' = (F - A^2 K^2 / C) z'', psi = -(A K / C) z with z = z' =
 /// 0 at the ends.
-double criticalTension(double curvature) { return std::pow(kThin * curvature, 2) / kTwist - 4 * M_PI * M_PI * kWide; }
+double criticalTension(double curvature)
+{
+  return std::pow(kThin * curvature, 2) / kRibbonTwist - 4 * M_PI * M_PI * kWide;
+}
 
 /// Curvature and torsion [1/m] of a helix.
 struct Helix
@@ -79,11 +82,11 @@ Helix helixUnderTension(const Ribbon& ribbon, double tension, double handedness)
   const double rest = handedness * ribbon.torsion;
   const auto rate = [&](double a) {
     const double s = std::sin(a), c = std::cos(a);
-    return (kThin * ribbon.curvature * s + kTwist * rest * c) / (kThin * s * s + kTwist * c * c);
+    return (kThin * ribbon.curvature * s + kRibbonTwist * rest * c) / (kThin * s * s + kRibbonTwist * c * c);
   };
   const auto energy = [&](double a) {
     const double k = rate(a) * std::sin(a) - ribbon.curvature, t = rate(a) * std::cos(a) - rest;
-    return 0.5 * (kThin * k * k + kTwist * t * t) - tension * std::cos(a);
+    return 0.5 * (kThin * k * k + kRibbonTwist * t * t) - tension * std::cos(a);
   };
   double low = 0.01, high = 0.5 * M_PI;
   const double ratio = 0.5 * (std::sqrt(5.0) - 1);
@@ -164,7 +167,7 @@ struct Centreline
   }
 };
 
-void release(StudyContext& context, int edges)
+void releaseRibbon(StudyContext& context, int edges)
 {
   Ribbon ribbon(edges, kPitch);
   ribbon.drawFlat(1.2 * criticalTension(ribbon.curvature));
@@ -269,7 +272,7 @@ void runPerversion(StudyContext& context)
         .check(high, expected, 0.01 * expected, "linear stability, A^2 K^2/C - 4 pi^2 B/L^2")
         .set("relative_error", high / expected - 1);
     context.progress(k, 64, "release");
-    release(context, edges);
+    releaseRibbon(context, edges);
   }
   double perversions = 0;
   for (const Row& row : context.rows())

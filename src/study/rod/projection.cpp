@@ -12,19 +12,19 @@
 namespace slender::study {
 namespace {
 
-constexpr double kEnd = 0.6;   // [s] past the lowest point
+constexpr double kRopeEnd = 0.6;   // [s] past the lowest point
 constexpr int kEdges = 50;
-constexpr double kStretch = 1e4;   // [N]; the rope weighs half a newton
+constexpr double kRopeStretch = 1e4;   // [N]; the rope weighs half a newton
 
 struct Method
 {
   std::string name;
   Integrator integrator = Integrator::symplectic_euler;
   bool isotropic = true, projected = true;
-  double stretch = kStretch;
+  double stretch = kRopeStretch;
 };
 
-struct Run
+struct RopeRun
 {
   Eigen::Vector3d tip;
   double cpu = std::numeric_limits<double>::infinity();   ///< per simulated second
@@ -35,7 +35,7 @@ struct Run
 };
 
 /// 1 m of rope, 2 mm thick, released horizontally from a clamp.
-Run release(const Method& method, double step)
+RopeRun releaseRope(const Method& method, double step)
 {
   RodCase c = circularRod(1.0, 0.002, 1e7, 0.45, 4000, kEdges);
   c.stretch = method.stretch;
@@ -48,12 +48,12 @@ Run release(const Method& method, double step)
   rod.inputs.gravity = {0, 0, -9.81};
   rod.hold(0, 0, true);
   RodStepper stepper(rod.model, timeConfig(method.integrator, step, 1e-8));
-  const int steps = static_cast<int>(std::lround(kEnd / step));
-  Run run;
+  const int steps = static_cast<int>(std::lround(kRopeEnd / step));
+  RopeRun run;
   const double start = threadSeconds();
   for (int i = 0; i < steps && run.failure.empty(); ++i)
   {
-    const StepReport report = stepper.step(rod.state, rod.inputs, kEnd / steps);
+    const StepReport report = stepper.step(rod.state, rod.inputs, kRopeEnd / steps);
     if (!report.ok)
       run.failure = toString(report.failure);
     run.iterations = std::max(run.iterations, report.projection_iterations);
@@ -62,7 +62,7 @@ Run release(const Method& method, double step)
     // a relative error of the square is twice that of the length
     run.length_error = std::max(run.length_error, method.projected ? 0.5 * report.constraint_error : report.max_strain);
   }
-  run.cpu = (threadSeconds() - start) / kEnd;
+  run.cpu = (threadSeconds() - start) / kRopeEnd;
   run.tip = rod.tip();
   if (run.failure.empty() && !isFinite(rod.state))
     run.failure = "not finite";
@@ -82,8 +82,8 @@ void runProjection(StudyContext& context)
   // error
   context.progress(0, 4, "converged solution");
   const double h = context.quick() ? 4e-5 : 1e-5;
-  const Eigen::Vector3d a = release(projected, 4 * h).tip, b = release(projected, 2 * h).tip,
-                        c = release(projected, h).tip;
+  const Eigen::Vector3d a = releaseRope(projected, 4 * h).tip, b = releaseRope(projected, 2 * h).tip,
+                        c = releaseRope(projected, h).tip;
   const Eigen::Vector3d coarse = 2 * b - a, fine = 2 * c - b, exact = fine + (fine - coarse) / 3;
   const double uncertain = (exact - fine).norm();
   context.row()
@@ -110,9 +110,9 @@ void runProjection(StudyContext& context)
     for (const double step : steps)
     {
       context.progress(done++, static_cast<int>(methods.size() * steps.size()), method.name);
-      Run run = release(method, step);
+      RopeRun run = releaseRope(method, step);
       if (!context.quick() && run.failure.empty())
-        run.cpu = std::min(run.cpu, release(method, step).cpu);
+        run.cpu = std::min(run.cpu, releaseRope(method, step).cpu);
       const double error = run.failure.empty() ? (run.tip - exact).norm() : std::numeric_limits<double>::quiet_NaN();
       Row& row = context.row();
       row.set("method", method.name)
@@ -120,7 +120,7 @@ void runProjection(StudyContext& context)
           .set("tip_error_mm", 1e3 * error)
           .set("cpu_per_second", run.cpu);
       row.set("length_error", run.length_error).set("iterations_max", run.iterations);
-      row.set("iterations_mean", run.total_iterations / (kEnd / step)).set("cuts", run.cuts);
+      row.set("iterations_mean", run.total_iterations / (kRopeEnd / step)).set("cuts", run.cuts);
       if (!run.failure.empty())
       {
         row.set("failure", run.failure);

@@ -14,7 +14,7 @@
 namespace slender::study {
 namespace {
 
-struct Run
+struct StabilityRun
 {
   StabilityCell cell;
   Path path;
@@ -26,9 +26,9 @@ using Motion = std::function<void(int step, RodSetup& rod)>;
 /// (from step `quiet` on).
 /// `turned` [rad], if not zero: how far a straight rod must be twisted at the end, told by its energy beta turned^2/(2
 /// L).
-Run run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, int quiet, double turned = 0.0)
+StabilityRun run(RodSetup rod, const TimeConfig& time, int steps, const Motion& motion, int quiet, double turned = 0.0)
 {
-  Run r{{}, Path(rod.state.x)};
+  StabilityRun r{{}, Path(rod.state.x)};
   StabilityCell& cell = r.cell;
   cell.linear_steps = time.integrator == Integrator::symplectic_euler;
   RodStepper stepper(rod.model, time);
@@ -166,10 +166,10 @@ void runRodStability(StudyContext& context)
               .set("radius_over_length", radius)
               .set("step_s", step);
           const RodSetup rod = heldRod(radius, modulus, 50);
-          Run r = run(rod, timeConfig(integrator, step), 30, still, 0);
+          StabilityRun r = run(rod, timeConfig(integrator, step), 30, still, 0);
           if (r.cell.complaint.empty() && !r.cell.refused)
           {
-            const Run fine = run(rod, timeConfig(integrator, step / 4), 120, still, 0);
+            const StabilityRun fine = run(rod, timeConfig(integrator, step / 4), 120, still, 0);
             if (fine.cell.complaint.empty() && !fine.cell.refused)
               r.cell.compare(r.path, fine.path);
           }

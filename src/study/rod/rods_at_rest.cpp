@@ -12,7 +12,7 @@ namespace slender::study {
 namespace {
 
 constexpr double kGravity = 9.81, kDensity = 1000.0, kBoundMillimetres = 0.3;
-constexpr int kNodes = 200;
+constexpr int kNodesAtRest = 200;
 
 struct Rod
 {
@@ -24,10 +24,10 @@ struct Rod
 /// 0.6 u), first edge 2 mm, last 8 mm.
 Eigen::Matrix3Xd restNodes(bool graded)
 {
-  Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, kNodes);
-  for (int i = 0; i < kNodes; ++i)
+  Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, kNodesAtRest);
+  for (int i = 0; i < kNodesAtRest; ++i)
   {
-    const double u = i / (kNodes - 1.0);
+    const double u = i / (kNodesAtRest - 1.0);
     nodes(0, i) = graded ? u * (0.4 + 0.6 * u) : u;
   }
   return nodes;
@@ -35,7 +35,7 @@ Eigen::Matrix3Xd restNodes(bool graded)
 
 RodSetup clampedRod(const Rod& r, bool stretches, bool graded, double mass_damping)
 {
-  RodCase c = circularRod(1.0, r.radius, r.youngs_modulus, 0.3, kDensity, kNodes - 1);
+  RodCase c = circularRod(1.0, r.radius, r.youngs_modulus, 0.3, kDensity, kNodesAtRest - 1);
   if (!stretches)
     c.stretch = std::max(c.stretch, 1e6 * c.linear_density * kGravity);
   c.mass_damping = mass_damping;

@@ -20,7 +20,7 @@ struct Slip
 constexpr Slip kSlips[] = {{0.05, 0.01238049378}, {0.1, 0.04687417821}, {0.15, 0.09690456801},
                            {0.2, 0.1548673548},   {0.25, 0.2144635647}, {0.3, 0.2715634261}};
 
-struct Result
+struct PressedRod
 {
   double compression = 0;                     ///< of the foot's first slip, 0: none
   std::vector<double> compressions, ratios;   ///< |Fx| / N on the way there
@@ -28,7 +28,7 @@ struct Result
 
 /// L = B = 1. The strip is far stiffer out of its plane, so the problem is planar; light and damped, so the motion is
 /// quasistatic.
-Result press(int edges, const Slip& slip)
+PressedRod press(int edges, const Slip& slip)
 {
   const double radius = 5e-4, gap = 5e-5, foot = radius + 0.5 * gap;
   Eigen::Matrix3Xd nodes = straightCurve({0, 0, 1 + foot}, {0, 0, foot}, edges);
@@ -59,7 +59,7 @@ Result press(int edges, const Slip& slip)
   const double step = 0.02;
   World world = g.world(timeConfig(Integrator::implicit_euler, step, 1e-8));
   const Pose start = rod.inputs.grasps[0].X_WG;
-  Result result;
+  PressedRod result;
   double foot_before = g.state.rods[0].x(0, edges);
   for (double compression = 0; compression < 1.15 * slip.compression;)
   {
@@ -98,7 +98,7 @@ void runStickSlip(StudyContext& context)
     {
       const Slip& slip = kSlips[k];
       context.progress(done++, static_cast<int>(meshes.size() * std::size(kSlips)), "mu = " + std::to_string(slip.mu));
-      const Result r = press(edges, slip);
+      const PressedRod r = press(edges, slip);
       // the coefficient that belongs to the measured compression, by the table's local power law
       const Slip &a = kSlips[k > 0 ? k - 1 : 0], &b = kSlips[k > 0 ? k : 1];
       const double power = std::log(b.mu / a.mu) / std::log(b.compression / a.compression);

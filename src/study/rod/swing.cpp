@@ -12,13 +12,13 @@
 namespace slender::study {
 namespace {
 
-constexpr double kEnd = 1.0;   // [s]
-constexpr int kNodes = 200;
+constexpr double kSwingEnd = 1.0;   // [s]
+constexpr int kSwingNodes = 200;
 
 /// Tip at t = 1 s, converged in space and time, as the full study finds it; --quick takes it from here.
 const Eigen::Vector3d kConvergedTip(0.808002, 0.0, -0.556085);
 
-struct Run
+struct SwingRun
 {
   Eigen::Vector3d tip;
   double cpu_seconds = 0;   ///< per simulated second
@@ -29,20 +29,20 @@ struct Run
 };
 
 /// 1 m, r = 2 mm, E = 1e9 Pa, 1000 kg/m^3, clamped horizontally, released from rest without damping.
-Run release(int edges, const TimeConfig& time)
+SwingRun releaseRod(int edges, const TimeConfig& time)
 {
   RodSetup rod = straightRod(circularRod(1.0, 0.002, 1e9, 0.3, 1000.0, edges));
   rod.inputs.gravity = {0, 0, -9.81};
   rod.hold(0, 0, true);
   RodStepper stepper(rod.model, time);
   const double before = stepper.energies(rod.state, rod.inputs.gravity).total();
-  const int steps = static_cast<int>(std::lround(kEnd / time.step));
+  const int steps = static_cast<int>(std::lround(kSwingEnd / time.step));
 
-  Run run;
+  SwingRun run;
   const double start = threadSeconds();
   for (int i = 0; i < steps; ++i)
   {
-    const StepReport report = stepper.step(rod.state, rod.inputs, kEnd / steps);
+    const StepReport report = stepper.step(rod.state, rod.inputs, kSwingEnd / steps);
     run.iterations += report.iterations;
     run.cuts += report.cut_steps;
     run.steps += report.substeps;
@@ -53,18 +53,18 @@ Run release(int edges, const TimeConfig& time)
       break;
     }
   }
-  run.cpu_seconds = (threadSeconds() - start) / kEnd;
+  run.cpu_seconds = (threadSeconds() - start) / kSwingEnd;
   run.tip = rod.tip();
   run.energy_drift =
       (stepper.energies(rod.state, rod.inputs.gravity).total() - before) / (rod.model->totalMass() * 9.81);
   return run;
 }
 
-Run fastestOf(int repeats, int edges, const TimeConfig& time)
+SwingRun fastestOf(int repeats, int edges, const TimeConfig& time)
 {
-  Run best = release(edges, time);
+  SwingRun best = releaseRod(edges, time);
   for (int i = 1; i < repeats; ++i)
-    best.cpu_seconds = std::min(best.cpu_seconds, release(edges, time).cpu_seconds);
+    best.cpu_seconds = std::min(best.cpu_seconds, releaseRod(edges, time).cpu_seconds);
   return best;
 }
 
@@ -78,8 +78,8 @@ Eigen::Vector3d richardson(const Eigen::Vector3d& coarse, const Eigen::Vector3d&
 Eigen::Vector3d convergedTip(StudyContext& context)
 {
   const auto atMesh = [&](int edges) {
-    const Run coarse = release(edges, timeConfig(Integrator::implicit_midpoint, 4e-4, 1e-9));
-    const Run fine = release(edges, timeConfig(Integrator::implicit_midpoint, 2e-4, 1e-9));
+    const SwingRun coarse = releaseRod(edges, timeConfig(Integrator::implicit_midpoint, 4e-4, 1e-9));
+    const SwingRun fine = releaseRod(edges, timeConfig(Integrator::implicit_midpoint, 2e-4, 1e-9));
     const Eigen::Vector3d limit = richardson(coarse.tip, fine.tip);
     context.row()
         .set("integrator", "reference")
@@ -127,7 +127,7 @@ void runSwing(StudyContext& context)
   for (const Integrator integrator : implicitIntegrators())
     for (const double step : steps)
       for (const double tolerance : {1e-6, 1e-3, 1e-1})
-        candidates.push_back({kNodes - 1, timeConfig(integrator, step, tolerance), "fixed step"});
+        candidates.push_back({kSwingNodes - 1, timeConfig(integrator, step, tolerance), "fixed step"});
   if (!context.quick())
   {
     for (const int edges : {50, 100, 400})
@@ -139,10 +139,11 @@ void runSwing(StudyContext& context)
       {
         TimeConfig time = timeConfig(integrator, 0.01);
         time.error_tolerance = tolerance;
-        candidates.push_back({kNodes - 1, time, "adaptive " + std::to_string(1e6 * tolerance).substr(0, 4) + " um"});
+        candidates.push_back(
+            {kSwingNodes - 1, time, "adaptive " + std::to_string(1e6 * tolerance).substr(0, 4) + " um"});
       }
     for (const double step : {4e-6, 2e-6})   // stable below h sqrt(rho/E) = 5e-6 s
-      candidates.push_back({kNodes - 1, timeConfig(Integrator::symplectic_euler, step), "fixed step"});
+      candidates.push_back({kSwingNodes - 1, timeConfig(Integrator::symplectic_euler, step), "fixed step"});
   }
 
   WorkPrecision front(context, "swing_pareto", "Swinging rod, 200 nodes", "tip error at 1 s [mm]", 1e3);
@@ -154,7 +155,7 @@ void runSwing(StudyContext& context)
     const char* name = toString(candidate.time.integrator);
     context.progress(done++, static_cast<int>(candidates.size()), name);
     const bool explicit_run = candidate.time.integrator == Integrator::symplectic_euler;
-    const Run run = fastestOf(context.quick() || explicit_run ? 1 : 3, candidate.edges, candidate.time);
+    const SwingRun run = fastestOf(context.quick() || explicit_run ? 1 : 3, candidate.edges, candidate.time);
     const double error = run.ok ? 1e3 * (run.tip - converged).norm() : std::numeric_limits<double>::quiet_NaN();
     Row& row = context.row();
     row.set("integrator", name)
@@ -169,7 +170,7 @@ void runSwing(StudyContext& context)
     row.set("cpu_per_second", run.cpu_seconds);
     if (!run.ok)
       row.set("failure", run.message);
-    if (candidate.edges != kNodes - 1 || !run.ok)
+    if (candidate.edges != kSwingNodes - 1 || !run.ok)
       continue;
     char setting[96];
     std::snprintf(setting, sizeof setting, "%s, step %g s, tolerance %g, %s", name, candidate.time.step,

@@ -16,18 +16,18 @@ namespace slender::study {
 namespace {
 
 /// a flat ellipse, 2 : 1, bent the easy way; nu = 0.3; L = 1
-constexpr double kWeak = 1.0, kStrong = 4.0, kTwist = 1.6 / 1.3;
+constexpr double kWeak = 1.0, kStrong = 4.0, kTwistModulus = 1.6 / 1.3;
 constexpr double kBend = 1.0 / 12;   ///< length of the V's bend: four edges of 48
 constexpr double kTurnStep = 0.05;   ///< [rad]
 
-struct Shape
+struct RestShape
 {
   const char* name;
   double turn, length;   ///< of the bend in the middle [rad], [L]
   double angle(double s) const { return turn * std::clamp((s - 0.5) / length + 0.5, 0.0, 1.0); }
   double curvature(double s) const { return std::abs(s - 0.5) < 0.5 * length ? turn / length : 0.0; }
 };
-constexpr Shape kShapes[] = {{"V", M_PI / 2, kBend}, {"semicircle", M_PI, 1.0}};
+constexpr RestShape kRestShapes[] = {{"V", M_PI / 2, kBend}, {"semicircle", M_PI, 1.0}};
 
 /// Twist on the clamped and on the turned side of the middle [rad].
 struct Halves
@@ -43,7 +43,7 @@ struct Halves
 class HeldCurve
 {
 public:
-  explicit HeldCurve(const Shape& shape) : k2_(kIntervals + 1), psi_(kIntervals + 1, 0.0)
+  explicit HeldCurve(const RestShape& shape) : k2_(kIntervals + 1), psi_(kIntervals + 1, 0.0)
   {
     for (int i = 0; i <= kIntervals; ++i)   // mean over the cell, so that the bend's ends fall where they should
       for (int q = 0; q < 16; ++q)
@@ -74,7 +74,7 @@ private:
   /// One step with `weight` |change|^2 / 2 per length added; does nothing but say so when the matrix is not definite.
   bool newton(double weight, double& change)
   {
-    const double h = 1.0 / kIntervals, c = kTwist / h;
+    const double h = 1.0 / kIntervals, c = kTwistModulus / h;
     std::vector<double> diagonal(kIntervals + 1, 1.0), right(kIntervals + 1, 0.0);
     for (int i = 1; i < kIntervals; ++i)
     {
@@ -113,7 +113,7 @@ private:
 class TurnedRod
 {
 public:
-  TurnedRod(const Shape& shape, int edges, bool held) : edges_(edges)
+  TurnedRod(const RestShape& shape, int edges, bool held) : edges_(edges)
   {
     Eigen::Matrix3Xd nodes = Eigen::Matrix3Xd::Zero(3, edges + 1);
     for (int j = 0; j < edges; ++j)
@@ -121,7 +121,7 @@ public:
       const double a = shape.angle((j + 0.5) / edges);
       nodes.col(j + 1) = nodes.col(j) + Eigen::Vector3d(std::cos(a), 0, std::sin(a)) / edges;
     }
-    rod_ = naturalRod(sectionOf(1e6, kWeak, kStrong, kTwist), nodes, Eigen::Vector3d::UnitZ());
+    rod_ = naturalRod(sectionOf(1e6, kWeak, kStrong, kTwistModulus), nodes, Eigen::Vector3d::UnitZ());
     rod_.hold(0, 0, true);
     rod_.hold(edges, edges, true);
     for (int i = 1; held && i < edges; ++i)
@@ -190,7 +190,7 @@ void addProfile(Plot& plot, const std::string& label, const TurnedRod& rod, int 
   }
 }
 
-std::string number(double value)
+std::string shortText(double value)
 {
   char text[32];
   std::snprintf(text, sizeof text, "%g", value);
@@ -198,7 +198,7 @@ std::string number(double value)
 }
 
 /// Centreline held where it naturally is: against the smooth rod.
-void holdCentreline(StudyContext& context, const Shape& shape, const std::vector<int>& meshes)
+void holdCentreline(StudyContext& context, const RestShape& shape, const std::vector<int>& meshes)
 {
   const std::vector<double> looks = {1, 2, 4, 6, 10, 15, 17, 21, 25, 30, 33};   // well apart from the V's jumps
   const std::vector<double> profiles = {2, 6, 17, 21};
@@ -252,7 +252,7 @@ void holdCentreline(StudyContext& context, const Shape& shape, const std::vector
           .check(path.back().share(), smooth.share(), 0.02 * coarse,
                  "smooth rod, its balance of twist solved on a fine grid");
       if (edges == 48 && isAt(profiles, theta))
-        addProfile(profile, "turned by " + number(theta) + " rad", rod, edges);
+        addProfile(profile, "turned by " + shortText(theta) + " rad", rod, edges);
     });
     Row& row = context.row();
     row.set("shape", shape.name)
@@ -270,7 +270,7 @@ void holdCentreline(StudyContext& context, const Shape& shape, const std::vector
 }
 
 /// Centreline free between the clamps: against a refined rod. Larger angles would push the rod through itself.
-void freeCentreline(StudyContext& context, const Shape& shape, int fine)
+void freeCentreline(StudyContext& context, const RestShape& shape, int fine)
 {
   const std::vector<double> looks = {1, 2, 3, 4, 5};
   Plot& picture = context.plot(std::string("twist_asymmetry_free_") + shape.name,
@@ -305,8 +305,8 @@ void freeCentreline(StudyContext& context, const Shape& shape, int fine)
           .set("twist_turned", h.turned)
           .set("twist_clamped", h.clamped)
           .check(h.share(), refined.at(look++), 0.02, std::to_string(fine + 1) + " vertices");
-      addProfile(profile, "turned by " + number(theta) + " rad", rod, edges);
-      Series& s = picture.at("turned by " + number(theta) + " rad");
+      addProfile(profile, "turned by " + shortText(theta) + " rad", rod, edges);
+      Series& s = picture.at("turned by " + shortText(theta) + " rad");
       for (int i = 0; i < rod.nodes().cols(); ++i)
       {
         s.x.push_back(rod.nodes()(0, i) + 0.5 * rod.nodes()(1, i));
@@ -323,7 +323,7 @@ void freeCentreline(StudyContext& context, const Shape& shape, int fine)
 void runTwistAsymmetry(StudyContext& context)
 {
   const std::vector<int> meshes = context.quick() ? std::vector<int>{48} : std::vector<int>{48, 96, 192};
-  for (const Shape& shape : kShapes)
+  for (const RestShape& shape : kRestShapes)
   {
     holdCentreline(context, shape, meshes);
     freeCentreline(context, shape, context.quick() ? 96 : 192);

@@ -12,11 +12,17 @@
 namespace slender::study {
 namespace {
 
-constexpr double kDensity = CoilFluid::density, kMu = CoilFluid::viscosity, kGravity = CoilFluid::gravity,
-                 kDiameter = CoilFluid::diameter, kSpeed = CoilFluid::speed, kBound = 0.05;
+constexpr double kMedianBound = 0.05;
 
-double heightUnit() { return std::cbrt(kMu * kMu / (kDensity * kDensity * kGravity)); }
-double frequencyUnit() { return std::cbrt(kGravity * kGravity * kDensity / kMu); }
+double heightUnit()
+{
+  return std::cbrt(CoilFluid::viscosity * CoilFluid::viscosity /
+                   (CoilFluid::density * CoilFluid::density * CoilFluid::gravity));
+}
+double frequencyUnit()
+{
+  return std::cbrt(CoilFluid::gravity * CoilFluid::gravity * CoilFluid::density / CoilFluid::viscosity);
+}
 
 /// Heights of the table on the given branches, ascending, each once.
 std::vector<double> heightsOf(const std::vector<int>& branches)
@@ -39,11 +45,11 @@ public:
       frequency_(frequency)
   {
     resolve(height, radius);
-    thread_ = nozzleThread(model_, {0, 0, height}, kSpeed);
-    thread_.inputs.gravity = {0, 0, -kGravity};
+    thread_ = nozzleThread(model_, {0, 0, height}, CoilFluid::speed);
+    thread_.inputs.gravity = {0, 0, -CoilFluid::gravity};
     // a perfectly straight thread would stand on the floor as a column
     thread_.state.x[0].x() += 0.1 * model_.feed_length;
-    thread_.state.v[0].y() += 0.02 * kSpeed;
+    thread_.state.v[0].y() += 0.02 * CoilFluid::speed;
   }
 
   /// Moves the nozzle there, slowly.
@@ -52,7 +58,7 @@ public:
     ThreadStepper stepper = makeStepper(thread_);
     // slower where branches end
     const double from = thread_.inputs.ends[1].position.z(),
-                 rate = (from > 8 && from < 20 ? 0.005 : 0.03) * kSpeed * (1 + from);
+                 rate = (from > 8 && from < 20 ? 0.005 : 0.03) * CoilFluid::speed * (1 + from);
     const int steps = static_cast<int>(std::ceil(std::abs(height - from) / (rate * step())));
     for (int k = 1; k <= steps; ++k)
     {
@@ -112,9 +118,9 @@ private:
   {
     const double edge = 2 * M_PI * radius / per_turn_;
     model_.name = "coiling";
-    model_.density = kDensity;
-    model_.viscosity = kMu;
-    model_.nozzle_diameter = kDiameter;
+    model_.density = CoilFluid::density;
+    model_.viscosity = CoilFluid::viscosity;
+    model_.nozzle_diameter = CoilFluid::diameter;
     model_.feed_length = std::min(edge, 0.1 * height);
     model_.limits.max_edge_length = 1.5 * edge;
     model_.limits.max_deposited = static_cast<int>(3 * per_turn_);
@@ -151,8 +157,8 @@ struct Results
 };
 
 /// One height: measures, compares, plots. Returns the branch.
-int record(StudyContext& context, Pouring& pouring, double height, const std::string& way, double settling_turns,
-           Results& results)
+int recordHeight(StudyContext& context, Pouring& pouring, double height, const std::string& way, double settling_turns,
+                 Results& results)
 {
   const CoilTrace trace = pouring.observe(settling_turns, 4);
   const double frequency = trace.frequency(), radius = trace.radius();
@@ -208,7 +214,7 @@ void runCoiling(StudyContext& context)
   {
     progress("up", height);
     pouring.raise(height);
-    const int branch = record(context, pouring, height, "up", height > 10 ? 30 : 12, results);
+    const int branch = recordHeight(context, pouring, height, "up", height > 10 ? 30 : 12, results);
     if (before == 1 && branch == 3)
       jump_up = 0.5 * (last + height);
     before = branch;
@@ -218,19 +224,19 @@ void runCoiling(StudyContext& context)
   {
     progress("down", *height);
     pouring.raise(*height);
-    const int branch = record(context, pouring, *height, "down", *height > 8 ? 30 : 12, results);
+    const int branch = recordHeight(context, pouring, *height, "down", *height > 8 ? 30 : 12, results);
     if (before == 3 && branch == 1)
       jump_down = 0.5 * (last + *height);
     before = branch;
     last = *height;
   }
   Pouring high(inertial.front(), 0.45, 8e-3 * inertial.front() * inertial.front(), step_angle, per_turn);
-  high.stir(2 * kDiameter, 40.0);
+  high.stir(2 * CoilFluid::diameter, 40.0);
   for (const double height : inertial)
   {
     progress("inertial", height);
     high.raise(height);
-    record(context, high, height, "inertial", 30, results);
+    recordHeight(context, high, height, "inertial", 30, results);
   }
 
   for (const SteadyCoil& c : steadyCoils())
@@ -238,8 +244,8 @@ void runCoiling(StudyContext& context)
   const double frequency = median(results.frequency_errors), radius = median(results.radius_errors);
   context.row()
       .set("way", "median relative error of Omega")
-      .check(frequency, 0.0, kBound, "steady coils on their stable branches");
-  context.row().set("way", "median relative error of R").check(radius, 0.0, kBound, "the same");
+      .check(frequency, 0.0, kMedianBound, "steady coils on their stable branches");
+  context.row().set("way", "median relative error of R").check(radius, 0.0, kMedianBound, "the same");
   // without hysteresis this would be 1
   context.row()
       .set("way", "hysteresis: jump going up over jump going down")

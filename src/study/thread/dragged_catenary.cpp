@@ -11,7 +11,7 @@
 namespace slender::study {
 namespace {
 
-constexpr double kHeight = 3.0, kBelt = 0.7, kInflow = 0.06, kBound = 0.02;
+constexpr double kNozzleHeight = 3.0, kBelt = 0.7, kNozzleSpeed = 0.06, kCatenaryBound = 0.02;
 
 struct Point
 {
@@ -23,22 +23,22 @@ struct ReferenceRow
 {
   Point without, with;   ///< surface tension: 0, 10
 };
-constexpr ReferenceRow kReference[] = {{{0, 3, 0.06}, {0, 3, 0.06}},
-                                       {{0.01438076, 2.595828, 0.1127951}, {0.03031502, 2.553635, 0.1108463}},
-                                       {{0.07825042, 2.19656, 0.177465}, {0.1491785, 2.122216, 0.1730725}},
-                                       {{0.1799894, 1.805055, 0.2497164}, {0.3176674, 1.707189, 0.2421377}},
-                                       {{0.3084207, 1.421477, 0.3251751}, {0.5209551, 1.30813, 0.3139036}},
-                                       {{0.470274, 1.050872, 0.3997248}, {0.769758, 0.9359228, 0.3847472}},
-                                       {{0.6774262, 0.7037547, 0.4699576}, {1.070091, 0.6040781, 0.452133}},
-                                       {{0.9410097, 0.3976945, 0.5337534}, {1.422842, 0.3289028, 0.5151485}},
-                                       {{1.267775, 0.1611389, 0.5910452}, {1.823333, 0.1299488, 0.5749393}},
-                                       {{1.648193, 0.02804899, 0.6446511}, {2.257466, 0.02287093, 0.6348531}},
-                                       {{2.051164, 0, 0.7}, {2.704545, 0, 0.7}}};
+constexpr ReferenceRow kCatenaries[] = {{{0, 3, 0.06}, {0, 3, 0.06}},
+                                        {{0.01438076, 2.595828, 0.1127951}, {0.03031502, 2.553635, 0.1108463}},
+                                        {{0.07825042, 2.19656, 0.177465}, {0.1491785, 2.122216, 0.1730725}},
+                                        {{0.1799894, 1.805055, 0.2497164}, {0.3176674, 1.707189, 0.2421377}},
+                                        {{0.3084207, 1.421477, 0.3251751}, {0.5209551, 1.30813, 0.3139036}},
+                                        {{0.470274, 1.050872, 0.3997248}, {0.769758, 0.9359228, 0.3847472}},
+                                        {{0.6774262, 0.7037547, 0.4699576}, {1.070091, 0.6040781, 0.452133}},
+                                        {{0.9410097, 0.3976945, 0.5337534}, {1.422842, 0.3289028, 0.5151485}},
+                                        {{1.267775, 0.1611389, 0.5910452}, {1.823333, 0.1299488, 0.5749393}},
+                                        {{1.648193, 0.02804899, 0.6446511}, {2.257466, 0.02287093, 0.6348531}},
+                                        {{2.051164, 0, 0.7}, {2.704545, 0, 0.7}}};
 
 std::vector<Point> referenceOf(double gamma)
 {
   std::vector<Point> points;
-  for (const ReferenceRow& row : kReference)
+  for (const ReferenceRow& row : kCatenaries)
     points.push_back(gamma > 0 ? row.with : row.without);
   return points;
 }
@@ -56,7 +56,7 @@ ThreadSetup draggedThread(double gamma, double feed)
   m.limits.max_edge_length = 4 * feed;
   m.floor = {true, 0.0, false};
   m.limits.scene.max().x() = 8.0;
-  ThreadSetup t = nozzleThread(m, {0, 0, kHeight}, kInflow);
+  ThreadSetup t = nozzleThread(m, {0, 0, kNozzleHeight}, kNozzleSpeed);
   t.inputs.gravity = {0, 0, -100};
   t.inputs.belt_velocity = {kBelt, 0, 0};
   return t;
@@ -80,20 +80,20 @@ double distance(const ThreadState& s, const Point& p, double* speed)
   return best;
 }
 
-struct Outcome
+struct Dragged
 {
   double error = 0, speed_error = 0, change = 0;
   ThreadState state;
 };
 
-Outcome drag(double gamma, double feed, double h, const std::vector<Point>& reference)
+Dragged drag(double gamma, double feed, double h, const std::vector<Point>& reference)
 {
   ThreadSetup t = draggedThread(gamma, feed);
   ThreadStepper stepper = makeStepper(t);
   while (t.time <
          300.0)   // the draw ratio of 11.7 is not far below that of draw resonance, 20.2: disturbances die out slowly
     advance(stepper, t, h, "dragged_catenary");
-  Outcome o;
+  Dragged o;
   // nodes land one by one: the mean of what the passage of some edges shows
   const int samples = static_cast<int>(std::lround(4.0 / h));
   std::vector<double> d(reference.size(), 0.0), u(reference.size(), 0.0);
@@ -131,10 +131,10 @@ void runDraggedCatenary(StudyContext& context)
     const std::vector<Point> reference = referenceOf(gamma);
     const std::string test = "gamma " + std::to_string(static_cast<int>(gamma));
     context.progress(gamma > 0, 2, test);
-    const Outcome seen = drag(gamma, feed, h, reference);
+    const Dragged seen = drag(gamma, feed, h, reference);
     Row& row = context.row();
     row.set("test", test).set("quantity", "largest distance from the reference, over the drop height");
-    row.check(seen.error / kHeight, 0.0, kBound, "boundary-value problem with bending, clamped nozzle")
+    row.check(seen.error / kNozzleHeight, 0.0, kCatenaryBound, "boundary-value problem with bending, clamped nozzle")
         .set("largest_relative_error_of_speed", seen.speed_error);
     row.set("nodes", seen.state.nodes());
     for (const Eigen::Vector3d& x : seen.state.x)

@@ -10,10 +10,11 @@
 namespace slender::study {
 namespace {
 
-constexpr double kDensity = 0.996, kMu = 273.6, kDiameter = 0.8, kInflow = 0.06, kDraw = 0.7, kHeight = 3.0;
-constexpr double kBound = 0.01;
+constexpr double kFiberDensity = 0.996, kFiberViscosity = 273.6, kFiberDiameter = 0.8, kFiberInflow = 0.06, kDraw = 0.7,
+                 kFiberLength = 3.0;
+constexpr double kFiberBound = 0.01;
 
-struct Case
+struct ExtrusionCase
 {
   const char* name;
   double gravity, gamma;
@@ -26,26 +27,26 @@ struct Extrusion
   double dz, top_tension = 0;
   std::vector<double> speed;
 
-  explicit Extrusion(const Case& c)
+  explicit Extrusion(const ExtrusionCase& c)
   {
     // shooting on U'(0), classical Runge-Kutta
     const int n = 3000;
-    dz = kHeight / n;
-    const double flux = kInflow * 0.25 * M_PI * kDiameter * kDiameter;
+    dz = kFiberLength / n;
+    const double flux = kFiberInflow * 0.25 * M_PI * kFiberDiameter * kFiberDiameter;
     // with A = flux/U and the tension T = 3 mu A U' + pi gamma a:  T' = rho A (U U' - g),  U' = (T - pi gamma a)/(3 mu
     // A)
     const auto slope = [&](double u, double tension) {
       const double area = flux / u;
-      return (tension - c.gamma * std::sqrt(M_PI * area)) / (3 * kMu * area);
+      return (tension - c.gamma * std::sqrt(M_PI * area)) / (3 * kFiberViscosity * area);
     };
     const auto shoot = [&](double tension) {
-      double u = kInflow, t = tension;
+      double u = kFiberInflow, t = tension;
       speed.assign(1, u);
       for (int i = 0; i < n; ++i)
       {
         const auto rate = [&](double uu, double tt, double& du, double& dt) {
           du = slope(uu, tt);
-          dt = kDensity * flux / uu * ((c.inertia ? uu * du : 0.0) - c.gravity);
+          dt = kFiberDensity * flux / uu * ((c.inertia ? uu * du : 0.0) - c.gravity);
         };
         double k1, l1, k2, l2, k3, l3, k4, l4;
         rate(u, t, k1, l1);
@@ -76,55 +77,56 @@ struct Extrusion
   }
 };
 
-struct Outcome
+struct DrawnFiber
 {
   double middle_speed, top_tension, worst, rms;   ///< errors of U(z): largest and root mean square, relative
 };
 
 /// Draws for four times the fluid's time of flight, then takes the mean over the passage of some edges.
-Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot* plot,
-             SurfaceShape shape = SurfaceShape::cylinder)
+DrawnFiber drawFiber(const ExtrusionCase& c, const Extrusion& exact, double feed, double h, Plot* plot,
+                     SurfaceShape shape = SurfaceShape::cylinder)
 {
   ThreadModel m;
   m.name = "fiber";
-  m.density = c.inertia ? kDensity : 1e-3 * kDensity;
-  m.viscosity = kMu;
+  m.density = c.inertia ? kFiberDensity : 1e-3 * kFiberDensity;
+  m.viscosity = kFiberViscosity;
   m.surface_tension = c.gamma;
   m.surface_shape = shape;
-  m.nozzle_diameter = kDiameter;
+  m.nozzle_diameter = kFiberDiameter;
   m.feed_length = feed;
   m.floor = {true, 0.0, false};
   m.limits.scene.min().z() = -0.5;
-  ThreadSetup t = nozzleThread(m, {0, 0, kHeight}, kInflow);
+  ThreadSetup t = nozzleThread(m, {0, 0, kFiberLength}, kFiberInflow);
   t.inputs.gravity = {0, 0, c.inertia ? -c.gravity : -1e3 * c.gravity};   // the same weight without the mass
   t.inputs.belt_velocity = {0, 0, -kDraw};
   // the fluid hangs as a thread from the start, as thick everywhere as the solution has it
   Eigen::Matrix3Xd nodes(3, 0);
   std::vector<double> z;
-  for (double at = -0.3; at < kHeight - 0.5 * feed;)
+  for (double at = -0.3; at < kFiberLength - 0.5 * feed;)
   {
     z.push_back(at);
-    at += std::min(feed * exact.at(kHeight - std::max(at, 0.0)) / kInflow, feed * kDraw / kInflow);
+    at += std::min(feed * exact.at(kFiberLength - std::max(at, 0.0)) / kFiberInflow, feed * kDraw / kFiberInflow);
   }
-  z.push_back(kHeight);
+  z.push_back(kFiberLength);
   nodes.resize(3, z.size());
   Eigen::VectorXd radii(z.size() - 1);
   for (std::size_t i = 0; i < z.size(); ++i)
     nodes.col(i) = Eigen::Vector3d(0, 0, z[i]);
   for (int j = 0; j < radii.size(); ++j)
-    radii[j] = 0.5 * kDiameter * std::sqrt(kInflow / exact.at(kHeight - std::max(0.5 * (z[j] + z[j + 1]), 0.0)));
+    radii[j] = 0.5 * kFiberDiameter *
+               std::sqrt(kFiberInflow / exact.at(kFiberLength - std::max(0.5 * (z[j] + z[j + 1]), 0.0)));
   const ThreadEnd nozzle = t.state.ends[1];
   t.state = makeThread(nodes, radii);
   t.state.ends[1] = nozzle;
   for (int i = 0; i < t.state.nodes(); ++i)
   {
     t.state.deposited[i] = z[i] < 0;
-    t.state.v[i].z() = -(z[i] < 0 ? kDraw : exact.at(kHeight - z[i]));
+    t.state.v[i].z() = -(z[i] < 0 ? kDraw : exact.at(kFiberLength - z[i]));
   }
 
   ThreadStepper stepper = makeStepper(t);
-  const double settle = 40.0, average = 10 * feed / kInflow;
-  Outcome o{};
+  const double settle = 40.0, average = 10 * feed / kFiberInflow;
+  DrawnFiber o{};
   double squares = 0.0;
   int samples = 0, steps = 0;
   while (t.time < settle + average)
@@ -139,13 +141,13 @@ Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot*
       const double zi = t.state.x[i].z();
       if (zi < 0)
         continue;
-      const double u = -t.state.v[i].z(), error = u / exact.at(kHeight - zi) - 1;
+      const double u = -t.state.v[i].z(), error = u / exact.at(kFiberLength - zi) - 1;
       o.worst = std::max(o.worst, std::abs(error));
       squares += error * error;
       ++samples;
       const double above = t.state.x[i + 1].z();
-      if (zi <= 0.5 * kHeight && above > 0.5 * kHeight)
-        o.middle_speed += u + (0.5 * kHeight - zi) / (above - zi) * (-t.state.v[i + 1].z() - u);
+      if (zi <= 0.5 * kFiberLength && above > 0.5 * kFiberLength)
+        o.middle_speed += u + (0.5 * kFiberLength - zi) / (above - zi) * (-t.state.v[i + 1].z() - u);
     }
   }
   o.top_tension /= steps;
@@ -156,7 +158,7 @@ Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot*
       if (t.state.x[i].z() >= 0)
       {
         plot->at(std::string(c.name)).points = true;
-        plot->at(std::string(c.name)).x.push_back(kHeight - t.state.x[i].z());
+        plot->at(std::string(c.name)).x.push_back(kFiberLength - t.state.x[i].z());
         plot->at(std::string(c.name)).y.push_back(-t.state.v[i].z());
       }
   return o;
@@ -166,41 +168,41 @@ Outcome draw(const Case& c, const Extrusion& exact, double feed, double h, Plot*
 
 void runFiberExtrusion(StudyContext& context)
 {
-  const Case cases[] = {{"no gravity", 0, 0, false},
-                        {"gravity", 100, 0, false},
-                        {"gravity, inertia", 100, 0, true},
-                        {"gravity, inertia, surface tension", 100, 10, true}};
+  const ExtrusionCase cases[] = {{"no gravity", 0, 0, false},
+                                 {"gravity", 100, 0, false},
+                                 {"gravity, inertia", 100, 0, true},
+                                 {"gravity, inertia, surface tension", 100, 10, true}};
   const double feed = context.quick() ? 0.01 : 0.005, h = context.quick() ? 0.02 : 0.01;
   Plot& plot = context.plot("fiber_extrusion", "Steady drawing: speed along the thread",
                             "distance from the nozzle [cm]", "speed [cm/s]");
   plot.log_x = plot.log_y = false;
   plot.markers = false;
   int done = 0;
-  for (const Case& c : cases)
+  for (const ExtrusionCase& c : cases)
   {
     context.progress(done++, 4, c.name);
     const Extrusion exact(c);
-    const Outcome seen = draw(c, exact, feed, h, &plot);
-    checkRelative(context, c.name, "speed at half height", seen.middle_speed, exact.at(0.5 * kHeight), kBound,
+    const DrawnFiber seen = drawFiber(c, exact, feed, h, &plot);
+    checkRelative(context, c.name, "speed at half height", seen.middle_speed, exact.at(0.5 * kFiberLength), kFiberBound,
                   "3 mu (A U')' + pi gamma a' + rho A g = rho A U U'");
-    checkRelative(context, c.name, "tension at the nozzle", seen.top_tension, exact.top_tension, kBound,
+    checkRelative(context, c.name, "tension at the nozzle", seen.top_tension, exact.top_tension, kFiberBound,
                   "3 mu A U' + pi gamma a");
     Row& row = context.row();
     row.set("test", c.name)
         .set("quantity", "speed, rms of the relative error along the thread")
-        .check(seen.rms, 0.0, kBound, "the same")
+        .check(seen.rms, 0.0, kFiberBound, "the same")
         .set("worst_node", seen.worst);
     if (c.gamma > 0)
     {
-      const Outcome cone = draw(c, exact, feed, h, nullptr, SurfaceShape::cone);
+      const DrawnFiber cone = drawFiber(c, exact, feed, h, nullptr, SurfaceShape::cone);
       context.row()
           .set("test", c.name)
           .set("quantity", "speed at half height, surface of cones")
           .set("measured", cone.middle_speed)
-          .set("relative_error", cone.middle_speed / exact.at(0.5 * kHeight) - 1);
+          .set("relative_error", cone.middle_speed / exact.at(0.5 * kFiberLength) - 1);
     }
     const std::string label = std::string(c.name) + " (exact)";
-    for (double z = 0; z <= kHeight; z += 0.05)
+    for (double z = 0; z <= kFiberLength; z += 0.05)
     {
       plot.at(label).x.push_back(z);
       plot.at(label).y.push_back(exact.at(z));
@@ -209,8 +211,9 @@ void runFiberExtrusion(StudyContext& context)
   const Extrusion exact(cases[2]);
   double errors[2];
   for (int k = 0; k < 2; ++k)
-    errors[k] =
-        draw(cases[2], exact, 0.02 / (k + 1), 0.02 / (k + 1), nullptr).middle_speed / exact.at(0.5 * kHeight) - 1;
+    errors[k] = drawFiber(cases[2], exact, 0.02 / (k + 1), 0.02 / (k + 1), nullptr).middle_speed /
+                    exact.at(0.5 * kFiberLength) -
+                1;
   context.note(
       "The equation has the tension pi gamma a of a slender thread, as the thread has with surface_shape cylinder. "
       "This thread's surface");

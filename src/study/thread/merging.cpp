@@ -13,7 +13,7 @@ namespace slender::study {
 namespace {
 
 /// SI units. Lengths of the edges and a shift along the threads are in radii.
-struct Case
+struct MergingCase
 {
   const char* name;
   double viscosity, surface_tension, radius;
@@ -24,14 +24,14 @@ constexpr double kUntil = 0.3;    // of the sum of the radii: below what is comp
 constexpr double kEdges = 24.0;   // radii long
 
 /// [s]
-double timeScale(const Case& c) { return c.viscosity * c.radius / c.surface_tension; }
+double timeScale(const MergingCase& c) { return c.viscosity * c.radius / c.surface_tension; }
 
 /// The model: surface tension 2 pi gamma r draws two balls of radius r = (r1 + r2)/2 together, mu (4 pi/3) rho |d'|
 /// resists, so
 ///   d' = -(3/2) gamma r / (mu rho),  rho^2 = r^2 - d^2/4,
 /// for d = 2 r cos(a) of constant radius a - sin(a) cos(a) = 3 gamma t / (2 mu r). Free threads also thicken, r' =
 /// gamma/(6 mu). By Runge-Kutta's method for a^3, which begins smoothly.
-double modelDistance(const Case& c, double time)
+double modelDistance(const MergingCase& c, double time)
 {
   const double growth = c.surface_tension / (6 * c.viscosity);
   const auto rate = [&](double t, double cube) {
@@ -56,7 +56,7 @@ struct Seen
   double radius = 0.0, volume_drift = 0.0;
 };
 
-Seen mergePair(const Case& c, int steps, double duration, double until)
+Seen mergePair(const MergingCase& c, int steps, double duration, double until)
 {
   WorldModel model;
   WorldState state;
@@ -172,13 +172,13 @@ void pile(StudyContext& context)
 void runMerging(StudyContext& context)
 {
   const int steps = context.quick() ? 200 : 800;
-  const Case cases[] = {{"honey", 10, 0.05, 1e-3},
-                        {"pitch", 1e6, 0.03, 1e-2},
-                        {"thin", 0.1, 0.07, 1e-4},
-                        {"short edges", 10, 0.05, 1e-3, 0.5},
-                        {"long edges", 10, 0.05, 1e-3, 3.0},
-                        {"nodes between nodes", 10, 0.05, 1e-3, 1.0, 0.4},
-                        {"unequal radii", 10, 0.05, 1e-3, 1.0, 0.0, 1.5}};
+  const MergingCase cases[] = {{"honey", 10, 0.05, 1e-3},
+                               {"pitch", 1e6, 0.03, 1e-2},
+                               {"thin", 0.1, 0.07, 1e-4},
+                               {"short edges", 10, 0.05, 1e-3, 0.5},
+                               {"long edges", 10, 0.05, 1e-3, 3.0},
+                               {"nodes between nodes", 10, 0.05, 1e-3, 1.0, 0.4},
+                               {"unequal radii", 10, 0.05, 1e-3, 1.0, 0.0, 1.5}};
   Plot& plot = context.plot("merging", "two parallel threads in touch", "gamma t / (mu r) [-]",
                             "distance of the axes / 2 r [-]");
   plot.log_x = plot.log_y = false;
@@ -186,7 +186,7 @@ void runMerging(StudyContext& context)
   const char* source = "2 pi gamma r = mu (4 pi/3) rho |d'|, rho^2 = r^2 - d^2/4, r' = gamma/(6 mu)";
   double drift = 0.0;
   int done = 0;
-  for (const Case& c : cases)
+  for (const MergingCase& c : cases)
   {
     context.progress(done++, static_cast<int>(std::size(cases)), c.name);
     const double unit = timeScale(c), duration = 0.5 * unit;

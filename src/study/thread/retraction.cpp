@@ -9,17 +9,17 @@
 namespace slender::study {
 namespace {
 
-constexpr double kMu = 100.0, kGamma = 20.0, kRadius = 0.1, kLength = 5.0;
+constexpr double kRetractingViscosity = 100.0, kGamma = 20.0, kStartRadius = 0.1, kStartLength = 5.0;
 
-struct Outcome
+struct Retracted
 {
   double length, radius, volume_drift;
 };
 
-Outcome retract(int edges, double h, double time)
+Retracted retract(int edges, double h, double time)
 {
-  ThreadSetup t = straightThread(kLength, Eigen::VectorXd::Constant(edges, kRadius));
-  t.model.viscosity = kMu;
+  ThreadSetup t = straightThread(kStartLength, Eigen::VectorXd::Constant(edges, kStartRadius));
+  t.model.viscosity = kRetractingViscosity;
   t.model.density = 1e-6;
   t.model.surface_tension = kGamma;
   t.model.surface_shape = SurfaceShape::cylinder;   // the formula is slender theory's, whose ends have no caps
@@ -31,14 +31,14 @@ Outcome retract(int edges, double h, double time)
   return {t.length(), t.state.radius(edges / 2), t.state.totalVolume() / volume - 1};
 }
 
-double exactRadius(double t) { return kRadius + kGamma * t / (6 * kMu); }
-double exactLength(double t) { return kLength * std::pow(kRadius / exactRadius(t), 2); }
+double exactRadius(double t) { return kStartRadius + kGamma * t / (6 * kRetractingViscosity); }
+double exactLength(double t) { return kStartLength * std::pow(kStartRadius / exactRadius(t), 2); }
 
 /// Length of a single edge with caps on both ends after `time`, from `length`.
 double edgeLength(double volume, double length, double h, double time)
 {
   ThreadSetup t = straightThread(length, Eigen::VectorXd::Constant(1, std::sqrt(volume / (M_PI * length))));
-  t.model.viscosity = kMu;
+  t.model.viscosity = kRetractingViscosity;
   t.model.density = 1e-6;
   t.model.surface_tension = kGamma;
   ThreadStepper stepper = makeStepper(t);
@@ -53,7 +53,9 @@ double exactEdgeLength(double volume, double length, double time)
 {
   constexpr int kSteps = 20000;
   const double dt = time / kSteps;
-  const auto rate = [volume](double l) { return -kGamma / (3.0 * kMu) * (std::sqrt(M_PI * l * l * l / volume) - 2.0); };
+  const auto rate = [volume](double l) {
+    return -kGamma / (3.0 * kRetractingViscosity) * (std::sqrt(M_PI * l * l * l / volume) - 2.0);
+  };
   for (int k = 0; k < kSteps; ++k)
     length += dt * rate(length + 0.5 * dt * rate(length));
   return length;
@@ -67,7 +69,7 @@ void runRetraction(StudyContext& context)
   double drift = 0.0;
   for (const double time : {0.5, 1.0, 2.0})
   {
-    const Outcome seen = retract(40, h, time);
+    const Retracted seen = retract(40, h, time);
     checkRelative(context, "free ends", "length", seen.length, exactLength(time), 0.01, "L0 (1 + gamma t/(6 mu a0))^-2")
         .set("t", time);
     checkRelative(context, "free ends", "radius", seen.radius, exactRadius(time), 0.01, "a0 + gamma t/(6 mu)")
@@ -75,7 +77,7 @@ void runRetraction(StudyContext& context)
     drift = std::max(drift, std::abs(seen.volume_drift));
   }
   // a rod and a disc of the same volume, on their way and when they have become drops
-  const double volume = M_PI * kRadius * kRadius * 1.0, drop = std::cbrt(4.0 * volume / M_PI);
+  const double volume = M_PI * kStartRadius * kStartRadius * 1.0, drop = std::cbrt(4.0 * volume / M_PI);
   for (const double length : {1.0, 0.05})
   {
     const std::string test = length > drop ? "rod of one edge" : "disc of one edge";

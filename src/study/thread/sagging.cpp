@@ -12,16 +12,13 @@
 namespace slender::study {
 namespace {
 
-/// The thesis's oil, CGS units.
-constexpr double kDensity = 0.907, kMu = 100.0, kTension = 20.0, kGravity = 981.0;
-
 struct Reference
 {
   double diameter, gamma, time, sag, middle_radius, end_radius;
 };
 
 /// String model (no bending) with inertia, plates 2.5 apart.
-const std::vector<Reference> kReference = {
+const std::vector<Reference> kStringModel = {
     {0.175, 0.0, 0.0300, 0.44157, 0.083852, 0.082929},  {0.175, 0.0, 0.0600, 0.95563, 0.077909, 0.073392},
     {0.175, 0.0, 0.1000, 1.3472, 0.073922, 0.064344},   {0.175, 0.0, 0.1500, 1.8778, 0.071053, 0.052003},
     {0.175, 0.0, 0.2000, 2.6924, 0.068615, 0.038199},   {0.175, 20.0, 0.0300, 0.44157, 0.08409, 0.083214},
@@ -36,11 +33,11 @@ const std::vector<Reference> kReference = {
 ThreadSetup heldThread(double length, double diameter, double gamma, int edges)
 {
   ThreadSetup t = straightThread(length, Eigen::VectorXd::Constant(edges, 0.5 * diameter));
-  t.model.density = kDensity;
-  t.model.viscosity = kMu;
+  t.model.density = ThesisOil::density;
+  t.model.viscosity = ThesisOil::viscosity;
   t.model.surface_tension = gamma;
   t.model.limits.max_edge_length = 2 * length / edges;
-  t.inputs.gravity = {0, 0, -kGravity};
+  t.inputs.gravity = {0, 0, -ThesisOil::gravity};
   t.hold(0);
   t.hold(1);
   return t;
@@ -68,7 +65,7 @@ double slowest(double length, double diameter, double gamma, int edges)
 {
   ThreadSetup t = heldThread(length, diameter, gamma, edges);
   ThreadStepper stepper = makeStepper(t);
-  const double unit = kMu / (kDensity * kGravity * length), h = 0.02;
+  const double unit = ThesisOil::viscosity / (ThesisOil::density * ThesisOil::gravity * length), h = 0.02;
   double before = 0.0, lowest = 1e300;
   while (t.time < 40 * unit)
   {
@@ -95,7 +92,7 @@ void followPath(StudyContext& context, Plot& path, double diameter, double gamma
   std::snprintf(label, sizeof label, "D = %g, gamma = %g", diameter, gamma);
   context.progress(0, 1, label);
   const double h = 2e-4;
-  for (const Reference& r : kReference)
+  for (const Reference& r : kStringModel)
   {
     if (r.diameter != diameter || r.gamma != gamma)
       continue;
@@ -152,7 +149,7 @@ void reportShape(StudyContext& context, Plot& map, const Shape& shape, double ca
 /// Maps the shapes of threads of several lengths and diameters; returns the fraction that disagrees with the law.
 double mapShapes(StudyContext& context, Plot& map, int edges)
 {
-  const double capillary = std::sqrt(kTension / (kDensity * kGravity));
+  const double capillary = std::sqrt(ThesisOil::surface_tension / (ThesisOil::density * ThesisOil::gravity));
   const std::vector<double> lengths =
       context.quick() ? std::vector<double>{1.0, 2.5} : std::vector<double>{0.6, 1.0, 1.6, 2.5, 4.0};
   const std::vector<double> ratios = context.quick() ? std::vector<double>{0.3, 0.7, 1.4, 3.0}
@@ -165,7 +162,8 @@ double mapShapes(StudyContext& context, Plot& map, int edges)
       Shape shape{length, ratio * 4.7 * capillary * capillary / length, ratio};
       if (shape.diameter > 0.25 * length)
         continue;   // no thread
-      shape.slowed_to = slowest(length, shape.diameter, kTension, edges) / slowest(length, shape.diameter, 0.0, edges);
+      shape.slowed_to = slowest(length, shape.diameter, ThesisOil::surface_tension, edges) /
+                        slowest(length, shape.diameter, 0.0, edges);
       wrong += !shape.agrees();
       ++cases;
       reportShape(context, map, shape, capillary);
@@ -186,7 +184,7 @@ void runSagging(StudyContext& context)
   Plot& path = context.plot("sagging_path", "Sag of the middle, plates 2.5 cm apart", "time [s]", "sag [cm]");
   path.log_x = path.log_y = false;
   for (const double diameter : {0.175, 0.033})
-    for (const double gamma : {0.0, kTension})
+    for (const double gamma : {0.0, ThesisOil::surface_tension})
       followPath(context, path, diameter, gamma, edges);
 
   Plot& map = context.plot("sagging_shapes", "Catenary or U", "D / a", "L / a");

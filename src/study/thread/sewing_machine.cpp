@@ -15,7 +15,7 @@ namespace {
 
 /// Silicone oil of Morris et al. (2008), CGS units, at a height where inertia is small: H (g/nu^2)^(1/3) = 0.59,
 /// Omega^2 H / g = 0.16.
-constexpr double kHeight = 2.5, kSpeed = 0.0537;
+constexpr double kSewingHeight = 2.5, kSewingSpeed = 0.0537;
 
 /// What the full and the quick form differ in. The quick one finds the same thresholds at a third of the cost.
 struct Resolution
@@ -38,10 +38,10 @@ ThreadSetup fallingThread(double radius, const Resolution& resolution)
   m.limits.min_edge_length = 0.1 * edge;
   m.limits.max_deposited = static_cast<int>(3 * resolution.per_turn);
   m.floor = {true, 0.0, false};
-  ThreadSetup t = nozzleThread(m, {0, 0, kHeight}, kSpeed);
+  ThreadSetup t = nozzleThread(m, {0, 0, kSewingHeight}, kSewingSpeed);
   t.inputs.gravity = {0, 0, -981};
   t.state.x[0].x() += 0.1 * edge;
-  t.state.v[0].y() += kSpeed;
+  t.state.v[0].y() += kSewingSpeed;
   return t;
 }
 

@@ -13,9 +13,8 @@
 namespace slender::study {
 namespace {
 
-/// The thesis's oil of Fig. 5.4, CGS units.
-constexpr double kDensity = 0.907, kMu = 100.0, kTension = 20.0, kGravity = 981.0, kLength = 2.5, kRadius = 0.0875,
-                 kEnd = 0.1;
+/// Fig. 5.4 of the thesis, CGS units.
+constexpr double kSpan = 2.5, kSpanRadius = 0.0875, kEnd = 0.1;
 constexpr int kSamples = 99;
 
 struct Run
@@ -26,12 +25,12 @@ struct Run
 
 Run sag(int edges, double h, double tolerance, Integrator integrator)
 {
-  ThreadSetup t = straightThread(kLength, Eigen::VectorXd::Constant(edges, kRadius));
-  t.model.density = kDensity;
-  t.model.viscosity = kMu;
-  t.model.surface_tension = kTension;
-  t.model.limits.max_edge_length = 2 * kLength / edges;
-  t.inputs.gravity = {0, 0, -kGravity};
+  ThreadSetup t = straightThread(kSpan, Eigen::VectorXd::Constant(edges, kSpanRadius));
+  t.model.density = ThesisOil::density;
+  t.model.viscosity = ThesisOil::viscosity;
+  t.model.surface_tension = ThesisOil::surface_tension;
+  t.model.limits.max_edge_length = 2 * kSpan / edges;
+  t.inputs.gravity = {0, 0, -ThesisOil::gravity};
   t.hold(0);
   t.hold(1);
   NewtonConfig newton;
@@ -48,7 +47,7 @@ Run sag(int edges, double h, double tolerance, Integrator integrator)
   int j = 0;
   for (int k = 0; k < kSamples; ++k)
   {
-    const double x = kLength * (k + 1) / (kSamples + 1);
+    const double x = kSpan * (k + 1) / (kSamples + 1);
     while (j + 2 < t.state.nodes() && t.state.x[j + 1].x() < x)
       ++j;
     const double share = (x - t.state.x[j].x()) / (t.state.x[j + 1].x() - t.state.x[j].x());
@@ -93,7 +92,7 @@ void runThreadAccuracy(StudyContext& context)
     for (const double step : steps)
       for (const double tolerance : {NewtonConfig{}.tolerance, 1e-2})
         candidates.push_back({Integrator::implicit_euler, n, step, tolerance});
-    const double edge = kLength / n, stable = kDensity * edge * edge / (6 * kMu);
+    const double edge = kSpan / n, stable = ThesisOil::density * edge * edge / (6 * ThesisOil::viscosity);
     if (n <= (context.quick() ? 25 : 100))
       candidates.push_back({Integrator::symplectic_euler, n, 0.5 * stable, NewtonConfig{}.tolerance});
   }

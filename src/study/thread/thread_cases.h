@@ -9,6 +9,12 @@
 
 namespace slender::study {
 
+/// The oil of the thesis's threads that sag between plates, CGS units.
+struct ThesisOil
+{
+  static constexpr double density = 0.907, viscosity = 100.0, surface_tension = 20.0, gravity = 981.0;
+};
+
 /// Model, state and inputs of one thread that belong together. Units are those of the case (CGS in most references).
 struct ThreadSetup
 {

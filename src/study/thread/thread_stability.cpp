@@ -84,7 +84,7 @@ Verdict run(const ThreadSetup& setup, double h, int steps, const Motion& motion)
 }
 
 /// Poured from a nozzle of 5 mm, 10 cm above a floor.
-ThreadSetup pour(double viscosity, double surface_tension, double speed = 0.05)
+ThreadSetup pouredThread(double viscosity, double surface_tension, double speed = 0.05)
 {
   ThreadModel m;
   m.name = "poured";
@@ -133,8 +133,8 @@ Verdict pourByDefaults(double viscosity, double surface_tension, double h, int s
   return v;
 }
 
-void record(StudyContext& context, StabilityTally& tally, double& volume_drift, const std::string& test, double h,
-            const Verdict& v)
+void recordVerdict(StudyContext& context, StabilityTally& tally, double& volume_drift, const std::string& test,
+                   double h, const Verdict& v)
 {
   Row& row = context.row();
   row.set("case", test).set("step_s", h);
@@ -180,7 +180,12 @@ void runThreadStability(StudyContext& context)
       {
         const std::string test = name("viscosity", mu) + name(", surface tension", gamma);
         context.progress(done++, static_cast<int>(9 * viscosities.size()), test);
-        record(context, tally, drift, test, h, run(pour(mu, gamma), h, h < 1e-4 ? 300 : h < 1e-2 ? 600 : 40, steady));
+        recordVerdict(context, tally, drift, test, h,
+                      run(pouredThread(mu, gamma), h,
+                          h < 1e-4   ? 300
+                          : h < 1e-2 ? 600
+                                     : 40,
+                          steady));
       }
   for (const double mu : viscosities)
     for (const double gamma : tensions)
@@ -188,7 +193,7 @@ void runThreadStability(StudyContext& context)
       const std::string test = "by defaults, " + name("viscosity", mu) + name(", surface tension", gamma);
       context.progress(done, done + 1, test);
       ++done;
-      record(context, tally, drift, test, 2e-3, pourByDefaults(mu, gamma, 2e-3, context.quick() ? 250 : 1000));
+      recordVerdict(context, tally, drift, test, 2e-3, pourByDefaults(mu, gamma, 2e-3, context.quick() ? 250 : 1000));
     }
   // Held at both ends and let go: thin and thick, thin and thick fluids.
   const auto held = [](double viscosity, double radius, double gravity) {
@@ -215,9 +220,9 @@ threads:
       context.quick() ? std::vector<double>{1e-4, 1e-2, 0.1} : std::vector<double>{1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.3},
       map_steps, 10, [&](double slenderness) { return held(100, 0.1 * slenderness, -9.81); });
   for (const double ratio : {1e2, 1e5})
-    record(context, tally, drift, name("stretched by", ratio), 0.1, stretch(ratio, 0.1, 200));
+    recordVerdict(context, tally, drift, name("stretched by", ratio), 0.1, stretch(ratio, 0.1, 200));
 
-  const double flow = pour(1, 0).inputs.flow_rate;
+  const double flow = pouredThread(1, 0).inputs.flow_rate;
   const struct
   {
     const char* name;
@@ -228,7 +233,7 @@ threads:
          in.ends[1].position = {0.05 * (std::fmod(t, 1.0) < 0.5), 0, 0.1};
        }},
       {"nozzle that turns about its axis, 3 rad/s",
-       [start = pour(1, 0).inputs.ends[1].orientation](double t, ThreadInputs& in) {
+       [start = pouredThread(1, 0).inputs.ends[1].orientation](double t, ThreadInputs& in) {
          in.ends[1].orientation = Eigen::Quaterniond(Eigen::AngleAxisd(3 * t, Eigen::Vector3d::UnitZ())) * start;
        }},
       {"flow that stops and starts again",
@@ -243,15 +248,15 @@ threads:
         context.progress(done, done + 1, m.name);
         ++done;
         const int steps = static_cast<int>((context.quick() ? 1.5 : 4.0) / h);
-        record(context, tally, drift, std::string(m.name) + name(", viscosity", mu), h,
-               run(pour(mu, 0.03), h, steps, m.motion));
+        recordVerdict(context, tally, drift, std::string(m.name) + name(", viscosity", mu), h,
+                      run(pouredThread(mu, 0.03), h, steps, m.motion));
       }
 
   context.progress(done, done + 1, "an hour");
   const double hour = context.quick() ? 300.0 : 3600.0, h = 0.02;
-  const Verdict early = run(pour(1e2, 0.03), h, static_cast<int>(60 / h), steady);
-  const Verdict late = run(pour(1e2, 0.03), h, static_cast<int>(hour / h), steady);
-  record(context, tally, drift, name("poured, seconds:", hour), h, late);
+  const Verdict early = run(pouredThread(1e2, 0.03), h, static_cast<int>(60 / h), steady);
+  const Verdict late = run(pouredThread(1e2, 0.03), h, static_cast<int>(hour / h), steady);
+  recordVerdict(context, tally, drift, name("poured, seconds:", hour), h, late);
   const double growth = static_cast<double>(late.most_nodes) / static_cast<double>(early.most_nodes);
   context.row()
       .set("case", "most nodes at a time, over those of the first minute")

@@ -8,13 +8,13 @@
 namespace slender::study {
 namespace {
 
-constexpr double kMu = 1000.0, kLength = 2.0, kRate = 3.0;
+constexpr double kTwistedViscosity = 1000.0, kTwistedLength = 2.0, kRate = 3.0;
 
 /// Torque about the axis on the turning end after `turns` of the thread.
 double torque(const Eigen::VectorXd& radii, double h, double turns, double* twist = nullptr)
 {
-  ThreadSetup t = straightThread(kLength, radii);
-  t.model.viscosity = kMu;
+  ThreadSetup t = straightThread(kTwistedLength, radii);
+  t.model.viscosity = kTwistedViscosity;
   t.model.density = 1e-3;
   t.hold(0);
   t.hold(1);
@@ -46,14 +46,16 @@ Eigen::VectorXd stepped(int edges)
 
 double exactStepped()
 {
-  return kRate / (0.5 * kLength * (1 / std::pow(0.1, 4) + 1 / std::pow(0.2, 4)) / (0.5 * M_PI * kMu));
+  return kRate /
+         (0.5 * kTwistedLength * (1 / std::pow(0.1, 4) + 1 / std::pow(0.2, 4)) / (0.5 * M_PI * kTwistedViscosity));
 }
 
 }   // namespace
 
 void runThreadTwist(StudyContext& context)
 {
-  const double uniform = 0.5 * M_PI * kMu * 1e-4 * kRate / kLength, step = context.quick() ? 0.02 : 0.005;
+  const double uniform = 0.5 * M_PI * kTwistedViscosity * 1e-4 * kRate / kTwistedLength,
+               step = context.quick() ? 0.02 : 0.005;
   for (const int edges : {10, 40})
   {
     double twist = 0.0;

@@ -8,13 +8,13 @@
 namespace slender::study {
 namespace {
 
-constexpr double kMu = 1000.0, kRadius = 0.1, kBound = 0.01;
+constexpr double kStretchedViscosity = 1000.0, kUnstretchedRadius = 0.1, kTroutonBound = 0.01;
 
 /// Between plates that move apart: at constant speed 1, or so that L = exp(t).
 ThreadSetup betweenPlates(int edges, double gamma)
 {
-  ThreadSetup t = straightThread(1.0, Eigen::VectorXd::Constant(edges, kRadius));
-  t.model.viscosity = kMu;
+  ThreadSetup t = straightThread(1.0, Eigen::VectorXd::Constant(edges, kUnstretchedRadius));
+  t.model.viscosity = kStretchedViscosity;
   t.model.density = 1e-6;   // the formulas have no inertia
   t.model.surface_tension = gamma;
   t.hold(0);
@@ -42,9 +42,9 @@ double plateForce(bool exponential, double gamma, int edges, double h, double ti
 
 double exactForce(bool exponential, double gamma, double time)
 {
-  const double area0 = M_PI * kRadius * kRadius, length = plateLength(exponential, time),
+  const double area0 = M_PI * kUnstretchedRadius * kUnstretchedRadius, length = plateLength(exponential, time),
                rate = exponential ? 1.0 : 1.0 / length;
-  return 3.0 * kMu * area0 / length * rate + M_PI * gamma * kRadius / std::sqrt(length);
+  return 3.0 * kStretchedViscosity * area0 / length * rate + M_PI * gamma * kUnstretchedRadius / std::sqrt(length);
 }
 
 struct Hanging
@@ -55,8 +55,8 @@ struct Hanging
 /// Under its own weight g = 981, clamped at the top, for a fraction of the time at which it would break off.
 Hanging hang(double gamma, int edges, double h, double time)
 {
-  ThreadSetup t = straightThread(1.0, Eigen::VectorXd::Constant(edges, kRadius));
-  t.model.viscosity = kMu;
+  ThreadSetup t = straightThread(1.0, Eigen::VectorXd::Constant(edges, kUnstretchedRadius));
+  t.model.viscosity = kStretchedViscosity;
   t.model.density = 1.0;
   t.model.surface_tension = gamma;
   t.model.surface_shape = SurfaceShape::cylinder;   // the formula is slender theory's
@@ -74,12 +74,14 @@ Hanging hang(double gamma, int edges, double h, double time)
 double hangingLength(double gamma, double time)
 {
   const int sections = 400, steps = 4000;
-  const double area0 = M_PI * kRadius * kRadius, dt = time / steps;
+  const double area0 = M_PI * kUnstretchedRadius * kUnstretchedRadius, dt = time / steps;
   double length = 0.0;
   for (int k = 0; k < sections; ++k)
   {
     const double below = (k + 0.5) / sections;
-    const auto rate = [&](double a) { return (-981.0 * area0 * below + gamma * std::sqrt(M_PI * a)) / (3 * kMu); };
+    const auto rate = [&](double a) {
+      return (-981.0 * area0 * below + gamma * std::sqrt(M_PI * a)) / (3 * kStretchedViscosity);
+    };
     double a = area0;
     for (int i = 0; i < steps; ++i)
       a += dt * rate(a + 0.5 * dt * rate(a));
@@ -103,14 +105,15 @@ void runTrouton(StudyContext& context)
         double radius = 0.0;
         const double force = plateForce(exponential, gamma, edges, h, time, &radius);
         const double length = plateLength(exponential, time);
-        checkRelative(context, test, "force", force, exactForce(exponential, gamma, time), kBound,
+        checkRelative(context, test, "force", force, exactForce(exponential, gamma, time), kTroutonBound,
                       "3 mu A L'/L + pi gamma a")
             .set("t", time);
-        checkRelative(context, test, "radius", radius, kRadius / std::sqrt(length), kBound, "a0 sqrt(L0/L)")
+        checkRelative(context, test, "radius", radius, kUnstretchedRadius / std::sqrt(length), kTroutonBound,
+                      "a0 sqrt(L0/L)")
             .set("t", time);
       }
 
-  const double t_star = 3 * kMu / 981.0;
+  const double t_star = 3 * kStretchedViscosity / 981.0;
   for (const double gamma : {0.0, 20.0})
     for (const double part : {0.25, 0.5, 0.75})
     {
@@ -118,12 +121,12 @@ void runTrouton(StudyContext& context)
       const Hanging seen = hang(gamma, context.quick() ? 40 : 80, h, part * t_star);
       const std::string test = "hanging, gamma " + std::to_string(static_cast<int>(gamma));
       const double length = gamma == 0 ? -std::log(1 - part) / part : hangingLength(gamma, part * t_star);
-      checkRelative(context, test, "length", seen.length, length, kBound,
+      checkRelative(context, test, "length", seen.length, length, kTroutonBound,
                     gamma == 0 ? "-L0 (t*/t) ln(1-t/t*)" : "3 mu dA/dt = -rho g A0 S + gamma sqrt(pi A)")
           .set("t", part * t_star);
       if (gamma == 0)
-        checkRelative(context, test, "radius at the top", seen.top_radius, kRadius * std::sqrt(1 - part), kBound,
-                      "a0 sqrt(1-t/t*)")
+        checkRelative(context, test, "radius at the top", seen.top_radius, kUnstretchedRadius * std::sqrt(1 - part),
+                      kTroutonBound, "a0 sqrt(1-t/t*)")
             .set("t", part * t_star);
     }
 

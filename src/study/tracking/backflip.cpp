@@ -83,11 +83,6 @@ double strain(const MeshTopology& topology, const Matrix3Xd& rest, const Matrix3
   return std::sqrt(sum / static_cast<double>(topology.edges.cols()));
 }
 
-double rms(const Matrix3Xd& a, const Matrix3Xd& b)
-{
-  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
-}
-
 }   // namespace
 
 void runBackflip(StudyContext& context)
@@ -156,7 +151,7 @@ void runBackflip(StudyContext& context)
       const double bent = bending(topology, mesh, held.x);
       folds += bent;
       stretch += strain(topology, mesh.vertices, held.x);
-      away += rms(held.x, smooth);
+      away += rmsDistance(held.x, smooth);
       course.frames.push_back(held.x);
       plot.at(look.name).x.push_back(k * step);
       plot.at(look.name).y.push_back(bent);
@@ -182,7 +177,7 @@ void runBackflip(StudyContext& context)
     {
       double sum = 0;
       for (std::size_t k = 0; k < courses[a].frames.size(); ++k)
-        sum += rms(courses[a].frames[k], courses[b].frames[k]) / static_cast<double>(courses[a].frames.size());
+        sum += rmsDistance(courses[a].frames[k], courses[b].frames[k]) / static_cast<double>(courses[a].frames.size());
       least = std::min(least, sum);
     }
   context.metric("intersections", static_cast<double>(meetings));

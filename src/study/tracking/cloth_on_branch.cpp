@@ -47,11 +47,6 @@ std::vector<int> orderAs(const Matrix3Xd& wanted, const Matrix3Xd& given)
   return order;
 }
 
-double rms(const Matrix3Xd& a, const Matrix3Xd& b)
-{
-  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
-}
-
 }   // namespace
 
 void runClothOnBranch(StudyContext& context)
@@ -118,9 +113,9 @@ void runClothOnBranch(StudyContext& context)
           .set("free_from_preview_m", fromPreview(free))
           .set("tracked_from_preview_m", fromPreview(tracked))
           .set("free_vertices_rms_m",
-               rms(vertices(free).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)))
+               rmsDistance(vertices(free).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)))
           .set("tracked_vertices_rms_m",
-               rms(vertices(tracked).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)));
+               rmsDistance(vertices(tracked).leftCols(tracking.guide.mesh.vertices.cols()), vertices(preview)));
   }
   draw(preview, "preview, " + std::to_string(config.cloths[preview].mesh.vertices.cols()) + " vertices");
   draw(free, "free, " + std::to_string(order.size()) + " vertices");

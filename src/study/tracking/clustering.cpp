@@ -58,7 +58,7 @@ Fit fitOf(const TriangleMesh& mesh, const std::vector<int>& body, const std::vec
 constexpr int kThesisRegions = 200;
 
 /// Means over the seeds.
-struct Outcome
+struct MeanClustering
 {
   Fit fit;
   double seconds = 0, iterations = 0, settled = 0;
@@ -67,8 +67,8 @@ struct Outcome
 const char* nameOf(bool aware) { return aware ? "animation-aware" : "static"; }
 
 /// The regions at rest and on a frame of the walk.
-void draw(SurfacePicture& picture, const TriangleMesh& mesh, const Eigen::Matrix3Xd& frame, const Clustering& clusters,
-          bool aware)
+void drawRegions(SurfacePicture& picture, const TriangleMesh& mesh, const Eigen::Matrix3Xd& frame,
+                 const Clustering& clusters, bool aware)
 {
   const Eigen::VectorXi hues = huesOf(mesh.triangles, clusters.region);
   const char* what = nameOf(aware);
@@ -78,8 +78,8 @@ void draw(SurfacePicture& picture, const TriangleMesh& mesh, const Eigen::Matrix
 }
 
 /// Clusters one seed, adds its share to the means and returns its regions.
-Clustering addSeed(Outcome& mean, const Biped& biped, const std::vector<Eigen::Matrix3Xd>& frames, int count, int seed,
-                   int seeds)
+Clustering addSeed(MeanClustering& mean, const Biped& biped, const std::vector<Eigen::Matrix3Xd>& frames, int count,
+                   int seed, int seeds)
 {
   const TriangleMesh& mesh = biped.mesh();
   ClusteringOptions options;
@@ -99,7 +99,8 @@ Clustering addSeed(Outcome& mean, const Biped& biped, const std::vector<Eigen::M
   return clusters;
 }
 
-void report(StudyContext& context, Plot& plot, const Outcome& mean, const TriangleMesh& mesh, int count, bool aware)
+void report(StudyContext& context, Plot& plot, const MeanClustering& mean, const TriangleMesh& mesh, int count,
+            bool aware)
 {
   context.row()
       .set("clustering", nameOf(aware))
@@ -136,17 +137,17 @@ void runClustering(StudyContext& context)
   const std::vector<int> counts =
       context.quick() ? std::vector<int>{kThesisRegions} : std::vector<int>{50, 100, kThesisRegions, 280};
   int done = 0;
-  Outcome thesis[2];   // of the thesis's count of regions: static, animation-aware
+  MeanClustering thesis[2];   // of the thesis's count of regions: static, animation-aware
   for (const int count : counts)
     for (const bool aware : {false, true})
     {
-      Outcome mean;
+      MeanClustering mean;
       for (int seed = 1; seed <= seeds; ++seed)
       {
         context.progress(done++, 2 * seeds * static_cast<int>(counts.size()), nameOf(aware));
         const Clustering clusters = addSeed(mean, biped, aware ? walk : rest, count, seed, seeds);
         if (count == kThesisRegions && seed == 1)
-          draw(picture, mesh, walk[12], clusters, aware);
+          drawRegions(picture, mesh, walk[12], clusters, aware);
       }
       report(context, plot, mean, mesh, count, aware);
       if (count == kThesisRegions)

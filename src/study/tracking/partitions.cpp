@@ -16,7 +16,7 @@ using Eigen::Matrix3Xd;
 
 namespace {
 
-constexpr double kSide = 0.6, kContraction = 0.12, kDuration = 1.5;
+constexpr double kSide = 0.6, kContraction = 0.12, kFoldingDuration = 1.5;
 
 GuidedCloth contracting(int cells, const std::vector<int>& region)
 {
@@ -73,7 +73,7 @@ Folded fold(const GuidedCloth& c)
   Matrix3Xd& x = run.cloth().state.x;
   disturb(x);
   Folded folded;
-  const int steps = static_cast<int>(std::lround(kDuration / c.step));
+  const int steps = static_cast<int>(std::lround(kFoldingDuration / c.step));
   for (int k = 0; k < steps; ++k)
   {
     const StepReport report = run.step();
@@ -82,7 +82,7 @@ Folded fold(const GuidedCloth& c)
     folded.error = std::max(folded.error, run.error());
   }
   folded.x = x;
-  folded.away = std::sqrt((x - c.at(run.time())).squaredNorm() / static_cast<double>(x.cols()));
+  folded.away = rmsDistance(x, c.at(run.time()));
   folded.ms = 1e3 * run.seconds() / steps;
   return folded;
 }

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr int kAnchors = 12;
-constexpr double kStep = 1e-3, kSettle = 1.0, kPulse = 0.02;   // [s]
+constexpr double kBandStep = 1e-3, kSettle = 1.0, kPulse = 0.02;   // [s]
 
 struct Band
 {
@@ -95,7 +95,7 @@ struct BandRun
   double error = 0, ms = 0;   ///< greatest distance of a segment's centre from the guide's [m]; CPU time per step
 };
 
-enum class Motion
+enum class BandMotion
 {
   shift,
   turn
@@ -103,11 +103,11 @@ enum class Motion
 
 /// Settles on the guide, which is then accelerated sideways, or about its middle (at 0.1 m from there), for kPulse and
 /// goes on at that speed.
-BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
+BandRun followedGuide(const Band& band, bool averages, BandMotion motion, double acceleration)
 {
   WorldModel model;
   model.time.integrator = Integrator::implicit_euler;
-  model.time.step = kStep;
+  model.time.step = kBandStep;
   model.rods.emplace_back().model = band.model;
   WorldState world_state;
   WorldInputs world_inputs;
@@ -130,15 +130,15 @@ BandRun run(const Band& band, bool averages, Motion motion, double acceleration)
       inputs.grasps.push_back({state.grasps.back().X_WG, std::nullopt});
     }
   World world(model, world_state);
-  const int settle = static_cast<int>(std::lround(kSettle / kStep)),
-            pulse = static_cast<int>(std::lround(kPulse / kStep)), after = 4 * pulse;
+  const int settle = static_cast<int>(std::lround(kSettle / kBandStep)),
+            pulse = static_cast<int>(std::lround(kPulse / kBandStep)), after = 4 * pulse;
   BandRun result;
   double seconds = 0;
   for (int k = 1; k <= settle + pulse + after; ++k)
   {
-    const double t = (k - settle) * kStep, accelerated = std::clamp(t, 0.0, kPulse);
+    const double t = (k - settle) * kBandStep, accelerated = std::clamp(t, 0.0, kPulse);
     const double far = acceleration * (0.5 * accelerated * accelerated + accelerated * std::max(0.0, t - kPulse));
-    const bool turns = motion == Motion::turn;
+    const bool turns = motion == BandMotion::turn;
     const Vector3d way = turns ? Vector3d(0, 0, 0) : Vector3d(far, 0, 0),
                    spin(0, 0, turns ? acceleration * accelerated / 0.1 : 0.0);
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(turns ? far / 0.1 : 0.0, Vector3d::UnitZ()).toRotationMatrix();
@@ -185,26 +185,26 @@ void runRubberBand(StudyContext& context)
   const Camera camera{{0, 0, -1}, {0, 1, 0}};
   struct Case
   {
-    Motion motion;
+    BandMotion motion;
     double acceleration;
   };
-  std::vector<Case> cases{{Motion::shift, 10}, {Motion::shift, 1000}, {Motion::turn, 100}};
+  std::vector<Case> cases{{BandMotion::shift, 10}, {BandMotion::shift, 1000}, {BandMotion::turn, 100}};
   if (!context.quick())
-    cases.insert(cases.end(), {{Motion::shift, 100},
-                               {Motion::shift, 300},
-                               {Motion::shift, 3000},
-                               {Motion::turn, 10},
-                               {Motion::turn, 30},
-                               {Motion::turn, 300}});
+    cases.insert(cases.end(), {{BandMotion::shift, 100},
+                               {BandMotion::shift, 300},
+                               {BandMotion::shift, 3000},
+                               {BandMotion::turn, 10},
+                               {BandMotion::turn, 30},
+                               {BandMotion::turn, 300}});
   int done = 0;
   for (const auto& [motion, acceleration] : cases)
   {
-    const bool shifts = motion == Motion::shift;
+    const bool shifts = motion == BandMotion::shift;
     double kinetic[2];
     for (const bool averages : {false, true})
     {
       context.progress(done++, 2 * static_cast<int>(cases.size()), averages ? "averages" : "points");
-      const BandRun r = run(band, averages, motion, acceleration);
+      const BandRun r = followedGuide(band, averages, motion, acceleration);
       const std::string label = averages ? "averages" : "points";
       kinetic[averages] = r.kinetic;
       context.row()

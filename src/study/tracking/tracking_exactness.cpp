@@ -12,8 +12,8 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kStep = 0.01;     // [s]
-constexpr double kBound = 1e-10;   // |c| over the area of a test function and the guide's size
+constexpr double kExactStep = 0.01;   // [s]
+constexpr double kBound = 1e-10;      // |c| over the area of a test function and the guide's size
 
 struct Scene
 {
@@ -44,7 +44,7 @@ std::vector<Scene> scenes(bool quick)
   Scene jumps{"sheet whose guide jumps", sheet};
   jumps.cloth.motion = [rest = sheet.guide.vertices](double t) {
     // by its own size and more, turned each time
-    const int jump = static_cast<int>(std::floor(t / (10 * kStep) + 1e-6));
+    const int jump = static_cast<int>(std::floor(t / (10 * kExactStep) + 1e-6));
     const Eigen::Vector3d to(3 * std::sin(7.0 * jump), 2 * (1 - std::cos(5.0 * jump)), 2 * std::sin(3.0 * jump));
     return Eigen::Matrix3Xd(
         (Eigen::AngleAxisd(2.0 * jump, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix() * rest).colwise() +
@@ -85,7 +85,7 @@ struct Result
   bool finite = true;
 };
 
-Result follow(StudyContext& context, const Scene& scene, int steps)
+Result followExactly(StudyContext& context, const Scene& scene, int steps)
 {
   const TrackedCase& c = scene.cloth;
   ClothOptions options;
@@ -112,8 +112,8 @@ Result follow(StudyContext& context, const Scene& scene, int steps)
   for (int k = 1; k <= steps; ++k)
   {
     context.progress(k, steps, scene.what);
-    inputs.cloths[0].averages = c.constraints->averages(c.motion(k * kStep));
-    const StepReport report = group.step(state, inputs, kStep);
+    inputs.cloths[0].averages = c.constraints->averages(c.motion(k * kExactStep));
+    const StepReport report = group.step(state, inputs, kExactStep);
     if (!report.ok)
       throw std::runtime_error("tracking_exactness: " + scene.what + ", step " + std::to_string(k) + ": " +
                                report.message);
@@ -134,7 +134,7 @@ void runTrackingExactness(StudyContext& context)
   int not_finite = 0;
   for (const Scene& scene : scenes(context.quick()))
   {
-    const Result r = follow(context, scene, context.quick() ? 40 : 120);
+    const Result r = followExactly(context, scene, context.quick() ? 40 : 120);
     not_finite += !r.finite;
     context.row()
         .set("scene", scene.what)

@@ -113,7 +113,7 @@ enum class Method
   projection
 };
 
-Run follow(const GuidedCloth& base, const Outside& outside, Method method, double h, double stiffness)
+Run followBy(const GuidedCloth& base, const Outside& outside, Method method, double h, double stiffness)
 {
   GuidedCloth c = base;
   c.step = h;
@@ -154,14 +154,6 @@ Run follow(const GuidedCloth& base, const Outside& outside, Method method, doubl
 }
 
 /// RMS distance over all frames [m].
-double distance(const std::vector<Matrix3Xd>& a, const std::vector<Matrix3Xd>& b)
-{
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k)
-    sum += (a[k] - b[k]).squaredNorm() / static_cast<double>(a[k].cols());
-  return std::sqrt(sum / static_cast<double>(a.size()));
-}
-
 }   // namespace
 
 void runTrackingMethods(StudyContext& context)
@@ -177,7 +169,7 @@ void runTrackingMethods(StudyContext& context)
   GuidedCloth exact = c;
   exact.one_newton_step = false;
   exact.linear_tolerance = 1e-6;
-  const Run reference = follow(exact, outside, Method::multipliers, 0.02 / std::exp2(halvings + 2), 0.0);
+  const Run reference = followBy(exact, outside, Method::multipliers, 0.02 / std::exp2(halvings + 2), 0.0);
   if (!reference.ok)
     throw std::runtime_error("reference: " + reference.reason);
 
@@ -201,7 +193,7 @@ void runTrackingMethods(StudyContext& context)
     for (int k = 0; k <= halvings; ++k)
     {
       const double h = 0.02 / std::exp2(k);
-      const Run run = follow(c, outside, way.method, h, way.stiffness);
+      const Run run = followBy(c, outside, way.method, h, way.stiffness);
       Row& row = context.row();
       row.set("method", way.name).set("step_ms", 1e3 * h);
       if (way.method == Method::penalty)
@@ -212,7 +204,7 @@ void runTrackingMethods(StudyContext& context)
         row.set("outcome", run.reason);
         continue;
       }
-      const double error = distance(run.frames, reference.frames);
+      const double error = rmsDistance(run.frames, reference.frames);
       row.set("outcome", "done")
           .set("cpu_seconds", run.seconds)
           .set("rms_error_m", error)
@@ -237,17 +229,17 @@ void runTrackingMethods(StudyContext& context)
   // where bending smooths out the wrinkles that steps do not resolve, errors of multipliers are of first order
   GuidedCloth smooth = exact;
   smooth.model.bending_modulus *= kSmooth;
-  const Run smooth_reference = follow(smooth, outside, Method::multipliers, 0.02 / std::exp2(halvings + 2), 0.0);
+  const Run smooth_reference = followBy(smooth, outside, Method::multipliers, 0.02 / std::exp2(halvings + 2), 0.0);
   if (!smooth_reference.ok)
     throw std::runtime_error("reference of the stiff sheet: " + smooth_reference.reason);
   double coarse_smooth = 0, fine_smooth = 0;
   for (int k = 0; k <= halvings; ++k)
   {
     const double h = 0.02 / std::exp2(k);
-    const Run run = follow(smooth, outside, Method::multipliers, h, 0.0);
+    const Run run = followBy(smooth, outside, Method::multipliers, h, 0.0);
     if (!run.ok)
       throw std::runtime_error("stiff sheet: " + run.reason);
-    const double error = distance(run.frames, smooth_reference.frames);
+    const double error = rmsDistance(run.frames, smooth_reference.frames);
     context.row()
         .set("method", "multipliers, bending " + std::to_string(static_cast<int>(kSmooth)) + " times as stiff")
         .set("step_ms", 1e3 * h)

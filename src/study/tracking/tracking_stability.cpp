@@ -33,14 +33,14 @@ tracked:
 )";
 
 /// Where the guide's vertices are after step k of `steps`, from where they rest.
-using Motion = std::function<Matrix3Xd(const Matrix3Xd& rest, int k, int steps)>;
+using GuideMotion = std::function<Matrix3Xd(const Matrix3Xd& rest, int k, int steps)>;
 
 struct GuideCase
 {
   std::string name;
   bool to_be_refused = false;   ///< at steps 5 to 9, and the run goes on
   bool comes_to_rest = true;    ///< where it began, by half of the steps
-  Motion motion;
+  GuideMotion motion;
 };
 
 double fraction(int k, int steps) { return std::min(1.0, 2.0 * k / steps); }   // 1 from half of the steps on
@@ -138,7 +138,7 @@ struct Verdict
 
 /// A refusal must say why and leave the state as it was; the run goes on with the next guide. After ten refusals, or
 /// `budget` of CPU time [s], it ends.
-Verdict run(Simulation& simulation, const GuideCase& guide, int steps, double budget)
+Verdict runGuided(Simulation& simulation, const GuideCase& guide, int steps, double budget)
 {
   Verdict v;
   const Matrix3Xd rest = simulation.config().cloths[0].tracking->guide.mesh.vertices;
@@ -263,7 +263,7 @@ void runTrackingStability(StudyContext& context)
         continue;   // in contact: single steps of many seconds
       context.progress(cells, total, guide.name);
       Simulation simulation(parseScene(kScene, "sheet.yaml", setting.set));
-      Verdict v = run(simulation, guide, steps, context.quick() ? 1.5 : 20.0);
+      Verdict v = runGuided(simulation, guide, steps, context.quick() ? 1.5 : 20.0);
       // refusals of good guides end the cell; those of bad ones are what is wanted, and the steps after them
       if (guide.to_be_refused && v.cell.complaint.empty() &&
           !(v.refused == 5 && (v.cell.steps == steps - 5 || !v.finished)))
