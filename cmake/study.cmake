@@ -17,10 +17,10 @@ slender_compile_together(slender_sim_studies
   <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h> <slender_sim/study/study.h>)
 # lean tells instructions apart by the lines that they come from; repeatability runs the scenes of the package. Their
 # definitions differ from those of other studies, so they are compiled by themselves and without precompiled headers.
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/performance/repeatability.cpp
-  PROPERTY COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-set_property(SOURCE ${PROJECT_SOURCE_DIR}/src/study/performance/lean.cpp ${PROJECT_SOURCE_DIR}/src/study/performance/repeatability.cpp
-  PROPERTY SKIP_PRECOMPILE_HEADERS ON)
+foreach(study lean repeatability)
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/study/performance/${study}.cpp PROPERTIES
+    COMPILE_DEFINITIONS SLENDER_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SKIP_PRECOMPILE_HEADERS ON)
+endforeach()
 
 # `study` is too common a name for a target in a shared catkin workspace.
 set(TOOLS ${PROJECT_SOURCE_DIR}/src/tools)
