@@ -13,8 +13,8 @@ ClothSolver solverOf(const ClothModel& model, const ClothOptions& options)
 {
   if (options.solver != ClothSolver::automatic)
     return options.solver;
-  return !model.averages.empty() || model.vertices() > ClothLinearSolver::kMostSwept ? ClothSolver::conjugate_gradients
-                                                                                     : ClothSolver::gauss_seidel;
+  const bool fine = options.one_newton_step && model.vertices() > ClothLinearSolver::kMostSwept;
+  return fine || !model.averages.empty() ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
 }
 
 ClothLinearSolver::ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system)
