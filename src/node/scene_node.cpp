@@ -95,6 +95,7 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   for (const std::string& note : simulation_->config().notes)
     ROS_INFO("%s", note.c_str());
   limits_ = std::make_unique<LimitWatch>(*simulation_);
+  crossings_ = std::make_unique<CrossingWatch>(*simulation_);
   topics_ = std::make_unique<SceneTopics>(*simulation_);
   refuseLoops(*simulation_, *topics_);
   if (!options_.record_bag.empty())
@@ -254,6 +255,8 @@ bool SceneNode::advance()
   recent_.add(report, *simulation_, clock_.step(), busy);
   if (options_.stop_after > 0.0 && clock_.seconds() >= options_.stop_after - 0.5 * clock_.step())
     finished_ = true;
+  for (const std::string& crossing : crossings_->check())
+    ROS_WARN("%s", crossing.c_str());
   return mindLimits(limits_->checkStep());
 }
 

@@ -124,6 +124,7 @@ void SceneNode::takeUp(EditedScene edited)
   std::swap(simulation_, edited.simulation);   // inputs_ refers to the old simulation until makeInputs()
   topics_ = std::move(edited.topics);
   limits_ = std::make_unique<LimitWatch>(*simulation_);
+  crossings_ = std::make_unique<CrossingWatch>(*simulation_);
   makeInputs();
   {
     const std::vector<ros::Publisher> before = takePublishers();

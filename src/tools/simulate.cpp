@@ -19,6 +19,7 @@
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/scene/file_paths.h"
+#include "slender_sim/scene/crossing_watch.h"
 #include "slender_sim/scene/limit_watch.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorder.h"
@@ -186,18 +187,26 @@ private:
 };
 
 /// Checks the limits of the scene and reports excursions on stderr: each excursion once, and of each kind of limit at
-/// most one per simulated second.
+/// most one per simulated second. Reports objects without contact that others pass through, each pair once.
 class LimitTeller
 {
 public:
-  explicit LimitTeller(Simulation& simulation) : simulation_(simulation), watch_(simulation) {}
+  explicit LimitTeller(Simulation& simulation) : simulation_(simulation), watch_(simulation), crossings_(simulation) {}
 
   /// beforeStep() and afterStep() return false if the run must stop.
   bool beforeStep(slender::SceneInputs& inputs, Progress& progress)
   {
     return tell(watch_.checkInputs(inputs), progress);
   }
-  bool afterStep(Progress& progress) { return tell(watch_.checkStep(), progress); }
+  bool afterStep(Progress& progress)
+  {
+    for (const std::string& crossing : crossings_.check())
+    {
+      progress.clear();
+      std::fprintf(stderr, "simulate: warning: %s\n", crossing.c_str());
+    }
+    return tell(watch_.checkStep(), progress);
+  }
 
   const slender::LimitWatch& watch() const { return watch_; }
 
@@ -230,6 +239,7 @@ private:
 
   Simulation& simulation_;
   slender::LimitWatch watch_;
+  slender::CrossingWatch crossings_;
   std::array<std::optional<double>, 4> told_;   // [s] per kind: simulated time of the last report
 };
 

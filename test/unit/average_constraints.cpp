@@ -325,20 +325,22 @@ INSTANTIATE_TEST_SUITE_P(EachKind, TrackedClothMeets,
 /// Steps with its own matrix and with the shared one, while the guide and contact move.
 TEST(AverageConstraints, WarmStepsTakeNoMemory)
 {
-  for (const std::string& other : {std::string(), std::string(kRod)})
+  for (const std::string& scene : {kLifted, kLifted + kRod, kLiftedTowel, kLiftedTowel + "rods:" + kRod})
   {
-    Simulation s(parseScene(kLifted + other, "lifted"));
+    Simulation s(parseScene(scene, "lifted"));
     s.setThreads(1);
     SceneInputs inputs = s.defaultInputs();
     long least = 1000;
     for (int k = 0; k < 120; ++k)   // contacts may come and go in some of the steps
     {
+      if (!inputs.guides.empty())
+        inputs.guides[0].row(2).array() += 1e-5;
       const long before = allocations;
       ASSERT_TRUE(s.step(inputs).ok);
       if (k >= 60)
         least = std::min<long>(least, allocations - before);
     }
-    EXPECT_EQ(least, 0) << other;
+    EXPECT_EQ(least, 0) << scene;
   }
 }
 #endif

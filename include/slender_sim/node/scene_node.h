@@ -32,6 +32,7 @@
 #include "slender_sim/node/scene_messages.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
+#include "slender_sim/scene/crossing_watch.h"
 #include "slender_sim/scene/limit_watch.h"
 #include "slender_sim/scene/scene_edit.h"
 
@@ -172,6 +173,7 @@ private:
   std::unique_ptr<Simulation> simulation_;
   std::unique_ptr<SceneTopics> topics_;
   std::unique_ptr<LimitWatch> limits_;
+  std::unique_ptr<CrossingWatch> crossings_;
   SimClock clock_;
   bool clock_started_ = false;
   std::unique_ptr<GuideInputs> inputs_;

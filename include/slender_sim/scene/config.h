@@ -295,8 +295,7 @@ struct BodyConfig
   Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};      ///< constant, world axes, at the centre of mass [N], [N m]
   double linear_damping = 0.0, angular_damping = 0.0;   ///< [1/s]
   std::optional<GivenMotion> motion;                    ///< nothing: simulated
-  /// Its shape touches rods, threads and cloths; that of a simulated body, if it is a sphere, a box or a capsule, also
-  /// obstacles and other bodies.
+  /// Its shape touches rods, threads and cloths; that of a simulated body also obstacles and other bodies.
   bool contact = true;
   std::optional<double> friction;   ///< [-]; nothing: that of the rod; against solids 0.3
   bool broadcast_tf = false;        ///< nodes publish the frame of the body on tf

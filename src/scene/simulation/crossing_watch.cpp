@@ -1,0 +1,135 @@
+#include "slender_sim/scene/crossing_watch.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "slender_sim/contact/distance.h"
+#include "slender_sim/contact/solids.h"
+
+namespace slender {
+
+namespace {
+
+constexpr std::uint64_t kBetweenCurves = 4;   // steps; bodies may be fast, and are looked at in each step
+
+bool welds(const BodyConfig& body, int rod)
+{
+  return std::any_of(body.welds.begin(), body.welds.end(), [rod](const WeldConfig& weld) { return weld.rod == rod; });
+}
+
+}   // namespace
+
+CrossingWatch::CrossingWatch(const Simulation& simulation) : simulation_(simulation)
+{
+  const SceneConfig& scene = simulation.config();
+  std::vector<int> without, with;
+  const auto add = [&](Kind kind, const char* word, const auto& list) {
+    for (std::size_t k = 0; k < list.size(); ++k)
+    {
+      (list[k].contact ? with : without).push_back(static_cast<int>(objects_.size()));
+      objects_.push_back({kind, static_cast<int>(k), std::string(word) + " '" + list[k].name + "'"});
+    }
+  };
+  add(Kind::rod, "rod", scene.rods);
+  add(Kind::thread, "thread", scene.threads);
+  add(Kind::cloth, "cloth", scene.cloths);
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (const BodyConfig& body = scene.bodies[b]; !body.motion && body.shape && body.contact)
+    {
+      with.push_back(static_cast<int>(objects_.size()));
+      objects_.push_back({Kind::body, static_cast<int>(b), "body '" + body.name + "'"});
+    }
+  for (const int a : without)
+    for (const int b : with)
+    {
+      const Object &first = objects_[a], &second = objects_[b];
+      const bool cloths = first.kind == Kind::cloth && second.kind == Kind::cloth;
+      if (!cloths &&
+          !(first.kind == Kind::rod && second.kind == Kind::body && welds(scene.bodies[second.index], first.index)))
+        pairs_.push_back({a, b});
+    }
+}
+
+CrossingWatch::Pieces CrossingWatch::piecesOf(const Object& object) const
+{
+  Pieces out;
+  const WorldState& state = simulation_.state();
+  if (object.kind == Kind::rod)
+  {
+    const RodModel& model = simulation_.rodModel(object.index);
+    const Eigen::Matrix3Xd& x = state.rods[object.index].x;
+    for (int j = 0; j < model.edges(); ++j)
+      out.segments.emplace_back(x.col(j), x.col((j + 1) % model.nodes()));
+    out.radius = std::min(model.radius_a.minCoeff(), model.radius_b.minCoeff());
+  }
+  if (object.kind == Kind::thread)
+    for (const ThreadState& thread : state.threads[object.index].threads)
+      for (int j = 0; j < thread.edges(); ++j)
+      {
+        const double radius = thread.radius(j);
+        out.radius = out.segments.empty() ? radius : std::min(out.radius, radius);
+        out.segments.emplace_back(thread.x[j], thread.x[j + 1]);
+      }
+  if (object.kind == Kind::cloth)
+  {
+    const Eigen::Matrix3Xd& x = state.cloths[object.index].x;
+    const auto& edges = simulation_.clothModel(object.index).topology.edges;
+    for (Eigen::Index e = 0; e < edges.cols(); ++e)
+      out.segments.emplace_back(x.col(edges(0, e)), x.col(edges(1, e)));
+    out.radius = 0.5 * ContactProperties().thickness;
+  }
+  return out;
+}
+
+bool CrossingWatch::meets(const Pieces& pieces, const Object& other) const
+{
+  if (other.kind == Kind::body)
+  {
+    const Shape& shape = *simulation_.config().bodies[other.index].shape;
+    const WorldModel::Body& body = simulation_.world().model().bodies[other.index];
+    const Pose pose = simulation_.state().bodies[other.index].X_WB * body.X_BS;
+    const double reach = boundingRadius(shape) + pieces.radius;
+    return std::any_of(pieces.segments.begin(), pieces.segments.end(), [&](const auto& s) {
+      return pointSegmentDistance(pose.position, s.first, s.second) < reach &&
+             distanceToShape(shape, pose, s.first, s.second) < pieces.radius;
+    });
+  }
+  const Pieces others = piecesOf(other);
+  const double radii = pieces.radius + others.radius;
+  for (const auto& [a, b] : pieces.segments)
+    for (const auto& [c, d] : others.segments)
+      if ((a + b - c - d).norm() < (a - b).norm() + (c - d).norm() + 2.0 * radii && segmentDistance(a, b, c, d) < radii)
+        return true;
+  return false;
+}
+
+std::vector<std::string> CrossingWatch::check()
+{
+  std::vector<std::string> found;
+  const bool curves = simulation_.state().steps % kBetweenCurves == 0;
+  Pieces pieces;
+  int of = -1;   // the object of these pieces
+  for (auto pair = pairs_.begin(); pair != pairs_.end();)
+  {
+    const Object &without = objects_[pair->without], &other = objects_[pair->other];
+    const bool due = curves || other.kind == Kind::body;
+    if (due && of != pair->without)
+    {
+      pieces = piecesOf(without);
+      of = pair->without;
+    }
+    if (!due || !meets(pieces, other))
+    {
+      ++pair;
+      continue;
+    }
+    char time[40];
+    std::snprintf(time, sizeof time, "%.6g", simulation_.state().time);
+    found.push_back(without.name + " has no contact and passes through " + other.name + " (t = " + time +
+                    " s); give it the key contact if they shall touch");
+    pair = pairs_.erase(pair);
+  }
+  return found;
+}
+
+}   // namespace slender
