@@ -11,11 +11,12 @@ namespace slender {
 
 namespace {
 
-constexpr double kNear = 0.1;           ///< increment, over the shortest edge, below which the exact Hessian is taken
-constexpr double kShiftOfAngle = 0.2;   ///< of the weight of inertia, per unit of a shift of angles
-// The Schur complement solves three times as many systems in each iteration.
-constexpr int kMostAverages = 500;
-constexpr double kMostTurn = 0.7;   ///< of an edge in an iteration [rad], as for edges of rods
+constexpr double kNear = 0.1;             ///< increment, over the shortest edge, below which the exact Hessian is taken
+constexpr double kShiftOfAngle = 0.2;     ///< of the weight of inertia, per unit of a shift of angles
+constexpr int kTimesWork = 5;             ///< of a step in an island, over that of a cloth alone
+constexpr long kSharedFactorWork = 100;   ///< counts of a WorkBudget per vertex
+constexpr long kSharedSolutionWork = 4;   ///< likewise, of a solution with the factor
+constexpr double kMostTurn = 0.7;         ///< of an edge in an iteration [rad], as for edges of rods
 
 }   // namespace
 
@@ -37,7 +38,7 @@ ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions
       throw std::invalid_argument("cloth '" + m.name + "': contact by the barrier takes at most " +
                                   std::to_string(kMostAverages) + " averages, and this cloth has " +
                                   std::to_string(set.count()) +
-                                  ": take fewer and larger test functions, or contact by impulses");
+                                  ": take fewer and larger test functions, or contact: {method: impulses}");
     average_sets_.push_back(std::make_unique<AverageConstraints>(*set.weights));
   }
   allocate();
@@ -67,8 +68,10 @@ void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double
   setPins(state.pins);
   duration_ = duration;
   averages_ = average_sets_.empty() ? nullptr : average_sets_[static_cast<std::size_t>(state.average_set)].get();
-  if (averages_)
-    averages_->begin(state.x, inputs.averages);
+  if (!averages_)
+    return;
+  averages_->begin(state.x, inputs.averages);
+  stages_.startBudget(kTimesWork);
 }
 
 StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)
@@ -131,7 +134,7 @@ void ClothPart::refuse(StepFailure failure, double length, StepReport& report) c
   const char* why = "";
   if (dependent_)
     why = kDependentAverages;
-  else if (averages_ && failure != StepFailure::work_exceeded)
+  else if (averages_ && (failure == StepFailure::squeezed || largest_contact_ > 0.0))
     why =
         "what the cloth touches may not let it have the averages of its guide: keep the guide clear of that, or let "
         "it move by less at once";
@@ -414,6 +417,8 @@ void ClothPart::takeDirection(const double* solution)
     else
       vertex(direction_, i).setZero();
   near_ = incrementSize(0.0) < kNear;
+  if (averages_)
+    stages_.spend(points() * (kSharedFactorWork + 3 * averages_->count() * kSharedSolutionWork));
 }
 
 void ClothPart::addColumns(int point, int component, double weight, Columns& row) const

@@ -20,6 +20,9 @@ namespace slender {
 class ClothPart final : public Part
 {
 public:
+  /// Averages that a set may have. Each iteration solves for three multipliers per average.
+  static constexpr int kMostAverages = 500;
+
   /// Throws std::invalid_argument for other integrators than implicit_euler, for averages whose forces have bounds, and
   /// for a model or options that are not valid. The island minimises wholly, whether the options ask for one Newton
   /// step or not. A cloth with prescribed averages is always coupled, because its own solvers know no averages.

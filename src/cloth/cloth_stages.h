@@ -84,6 +84,9 @@ public:
   /// Inputs of the step.
   const ClothInputs& inputs() const { return *inputs_; }
   bool workExceeded() const { return budget_->spent(); }
+  /// For an island of several parts: a step may do this many times the work of a step of the cloth alone.
+  void startBudget(int times) { budget_->start(times * WorkBudget::ofStep(model->vertices())); }
+  void spend(long counts) { budget_->spend(counts); }
   /// Where pin k of the state is at a fraction of the step.
   Eigen::Vector3d pinAt(std::size_t k, double fraction) const;
   double shortestEdge() const { return shortest_edge_; }   ///< at rest [m]

@@ -67,6 +67,8 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
       break;
     // what is in the way gives way, then on from there
     system.contact()->stiffen(solve(loose, 0.1));
+    if (total.failure == StepFailure::work_exceeded)
+      return total;
     system.accept();
     from = reached;
     system.placeHeld(to);

@@ -69,7 +69,7 @@ BodySurface facesOf(const TriangleMesh& mesh)
 {
   BodySurface out;
   const Eigen::Vector3d size = mesh.vertices.rowwise().maxCoeff() - mesh.vertices.rowwise().minCoeff();
-  out.radius = kRounding * size.minCoeff();
+  out.radius = kRounding * std::max(size.minCoeff(), 0.1 * size.maxCoeff());
   out.points = mesh.vertices;
   for (Eigen::Index i = 0; i < mesh.triangles.cols(); ++i)
     out.triangles.push_back({mesh.triangles(0, i), mesh.triangles(1, i), mesh.triangles(2, i)});

@@ -30,8 +30,8 @@ constexpr int kSidesOfCylinder = 64;   ///< of the prism that stands for a cylin
 
 /// The surface of a shape in the frame X_BS: one segment of a sphere (without length) or a capsule, the faces of a box,
 /// of a prism inside a cylinder, or of a mesh. Edges of a box and of a prism are rounded by a thousandth of their
-/// shortest side. A mesh grows on all sides by a thousandth of the shortest side of the box around it. Throws
-/// std::invalid_argument for a plane.
+/// shortest side. A mesh grows on all sides by a thousandth of the shortest side of the box around it, and by no less
+/// than a ten-thousandth of the longest one. Throws std::invalid_argument for a plane.
 BodySurface makeBodySurface(const Shape& shape, const Pose& X_BS);
 
 }   // namespace slender

@@ -28,10 +28,14 @@ BodyObject::BodyObject(const WorldModel& world, int number)
 {
   if (!model_.shape)
     return;
-  part->setReach(model_.X_BS.position.norm() + boundingRadius(*model_.shape));
+  double reach = model_.X_BS.position.norm() + boundingRadius(*model_.shape);
   if (meetsSolids(world, number))
-    part->setSurface(makeBodySurface(*model_.shape, model_.X_BS),
-                     model_.friction < 0.0 ? ContactProperties().friction : model_.friction);
+  {
+    const BodySurface surface = makeBodySurface(*model_.shape, model_.X_BS);
+    reach += surface.radius;   // a mesh grows by it
+    part->setSurface(surface, model_.friction < 0.0 ? ContactProperties().friction : model_.friction);
+  }
+  part->setReach(reach);
 }
 
 bool BodyObject::load(const WorldState& state, const WorldInputs& inputs, StepReport&)

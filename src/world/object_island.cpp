@@ -7,7 +7,7 @@ namespace slender {
 
 namespace {
 
-/// Threads and cloths are stepped by implicit Euler alone.
+/// Threads, and cloths that touch something, are stepped by implicit Euler alone.
 TimeConfig timeOf(TimeConfig time, bool damped)
 {
   if (damped)

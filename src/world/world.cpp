@@ -181,6 +181,9 @@ private:
   /// Cloths that lead others. They are stepped first, and feel only each other.
   void addLeaders(WorldState& state)
   {
+    for (std::size_t k = 0; k < model.cloths.size(); ++k)
+      if (model.cloths[k].tracked.leader >= 0 && model.leads(static_cast<int>(k)))
+        throw WorldError(Kind::cloth, static_cast<int>(k), "a cloth that tracks a guide cannot be one");
     addImpulses(true);
     WorldContent content;
     content.cloths = clothsThat(true, false);

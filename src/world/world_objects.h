@@ -39,7 +39,7 @@ struct WorldContent
   std::vector<int> rods;   ///< those that may meet something come first
   std::vector<int> threads;
   std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
-  std::vector<int> cloths;   ///< whose contact is the barrier
+  std::vector<int> cloths;   ///< that do not collide by impulses
 };
 
 struct WorldObjects

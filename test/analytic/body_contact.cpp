@@ -182,7 +182,7 @@ bodies:
      pose: {position: [1, 0, 0.1003], rpy: [0, 1.57079633, 0]}}
   - {name: ball, mass: 1, shape: {sphere: {radius: 0.05}}, pose: {position: [0.02, 0, 0.1311]}}
 )" + kFloor));
-  run(s, 1.0);
+  runFor(s, 1.0);
   const auto height = [&](int body) { return s.state().bodies[body].X_WB.position.z(); };
   // Each stands on the one below, at less than the gap.
   const double tops[] = {0.0, height(0) + 0.02, height(1) + 0.02};
@@ -206,7 +206,7 @@ bodies:
                           mesh + R"(}
   - {name: upper, mass: 1, inertia: [2.0e-3, 2.0e-3, 2.0e-3], pose: {position: [0.02, 0.01, 0.7], rpy: [-0.5, 0.1, 1]}, )" +
                           mesh + "}\n" + kFloor));
-  run(s, 4.0);
+  runFor(s, 4.0);
   for (const RigidBodyState& body : s.state().bodies)
   {
     EXPECT_LT(body.velocity.linear.norm(), 1e-4);

@@ -321,6 +321,27 @@ INSTANTIATE_TEST_SUITE_P(EachKind, TrackedClothMeets,
                                          Other{"Cloth", kCloth}, Other{"Body", kBall}, Other{"Obstacle", kLid}),
                          [](const auto& info) { return std::string(info.param.name); });
 
+/// The guide presses the towel against a ceiling, and the work for it is bounded.
+TEST(AverageConstraints, OfAClothThatACeilingDoesNotAllowAreRefused)
+{
+  Simulation s(
+      parseScene(kLiftedTowel, "lifted",
+                 {"obstacles=[{name: ceiling, shape: {plane: {point: [0, 0, 0.0015], normal: [0, 0, -1]}}}]"}));
+  SceneInputs inputs = s.defaultInputs();
+  StepReport report;
+  double highest = 0.0;
+  for (int k = 0; k < 100 && report.ok; ++k)
+  {
+    highest = s.state().cloths[0].x.row(2).maxCoeff();
+    inputs.guides[0].row(2).array() += 5e-5;
+    report = s.step(inputs);
+  }
+  EXPECT_FALSE(report.ok);
+  EXPECT_NE(report.message.find("the averages of its guide"), std::string::npos) << report.message;
+  EXPECT_EQ(s.state().cloths[0].x.row(2).maxCoeff(), highest);
+  EXPECT_LT(highest, 0.0015 - 0.0002);   // half the thickness
+}
+
 #ifdef SLENDER_COUNTS_ALLOCATIONS
 /// Steps with its own matrix and with the shared one, while the guide and contact move.
 TEST(AverageConstraints, WarmStepsTakeNoMemory)

@@ -318,7 +318,7 @@ bodies:
   - {name: box, mass: 2, shape: {box: {size: [0.4, 0.2, 0.1]}}, pose: {position: [0, 0, 0.551]}}
   - {name: ball, mass: 1, shape: {sphere: {radius: 0.05}}, pose: {position: [0.1, 0.02, 0.652]}}
 )");
-  run(simulation, 400);
+  runSteps(simulation, 400);
   const std::vector<FieldTable> tables = fieldTablesOf(simulation);
   ASSERT_EQ(tables.size(), 3u);
   const auto load = [&](std::size_t k, const std::string& name) { return column(tables[k], "contact_" + name)[0]; };

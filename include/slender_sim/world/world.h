@@ -71,7 +71,7 @@ public:
   Eigen::Matrix3Xd rodContactForces(int rod) const;
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const;
 
-  /// Contacts of rods, threads and bodies in the last step.
+  /// Contacts by the barrier in the last step.
   std::vector<ContactForce> contacts() const;
   /// What they exert on obstacles and bodies.
   SolidLoads solidLoads() const;

@@ -138,7 +138,7 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
   if (!others.empty())
   {
     cloths.warning(
-        "that have contact: {method: impulses}, have a max_traction, or are guides, pass through the " +
+        "whose contact is by impulses (named, or because they are guides or have a max_traction) pass through the " +
         joinWords(others) +
         " of this scene: such contact is with cloth of this kind, obstacles, and bodies with a given motion");
   }

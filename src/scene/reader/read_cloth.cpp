@@ -410,15 +410,17 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
           .number(Range::closed(0, 1e6, "N s/m^3")));
   damping.finish();
   YamlMap solver(map.get("solver", "Settings of the implicit solver of the cloth.").sharesKeysOf("cloths.N.solver"));
-  assign(cloth.solver,
-         solver
-             .get("linear",
-                  "Solver of the linear equations: gauss_seidel and conjugate_gradients solve to `tolerance`, cholesky "
-                  "exactly. Without the key, or with auto, it is chosen by the number of vertices.")
-             .choice<ClothSolver>({{"auto", ClothSolver::automatic},
-                                   {"cholesky", ClothSolver::cholesky},
-                                   {"conjugate_gradients", ClothSolver::conjugate_gradients},
-                                   {"gauss_seidel", ClothSolver::gauss_seidel}}));
+  assign(
+      cloth.solver,
+      solver
+          .get("linear",
+               "Solver of the linear equations: gauss_seidel and conjugate_gradients solve to `tolerance`, cholesky "
+               "exactly. Without the key, or with auto, it is chosen by one_newton_step, the number of vertices, and "
+               "what is tracked.")
+          .choice<ClothSolver>({{"auto", ClothSolver::automatic},
+                                {"cholesky", ClothSolver::cholesky},
+                                {"conjugate_gradients", ClothSolver::conjugate_gradients},
+                                {"gauss_seidel", ClothSolver::gauss_seidel}}));
   assign(cloth.linear_tolerance,
          solver.get("tolerance", "Relative residual to which the linear equations are solved. Without the key: 0.005.")
              .number(Range::between(0, 1)));

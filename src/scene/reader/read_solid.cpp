@@ -224,13 +224,15 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
                                       "Distance of two layers of cloth in contact; of two cloths the mean counts, and "
                                       "half of it from an obstacle. Without the key: 0.001 m.")
                                   .number(Range::above(0, 1, "m")));
-    assign(contact.method,
-           map.get("method",
-                   "`barrier` makes contact a part of the step, so that cloth meets everything that has contact. "
-                   "`impulses` correct the end of the step: cheaper, but for cloth, obstacles and driven bodies only. "
-                   "Without the key: barrier if rods, threads, simulated bodies or another cloth with barrier have "
-                   "contact, otherwise impulses; a cloth that has a max_traction or is a guide always takes impulses.")
-               .choice<ContactMethod>({{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}}));
+    assign(
+        contact.method,
+        map.get("method",
+                "`barrier` makes contact a part of the step, so that cloth meets everything that has contact. "
+                "`impulses` correct the end of the step: cheaper, but for cloth, obstacles and driven bodies only. "
+                "Without the key: barrier if rods, threads, simulated bodies or another cloth with barrier have "
+                "contact, otherwise impulses; a cloth that has a max_traction or more than 500 test functions, or is a "
+                "guide, always takes impulses.")
+            .choice<ContactMethod>({{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}}));
   }
   map.finish();
   return contact;

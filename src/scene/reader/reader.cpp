@@ -12,6 +12,7 @@
 #include "reader_log.h"
 #include "scene_tree.h"
 #include "solid_names.h"
+#include "cloth/cloth_part.h"
 
 namespace slender {
 
@@ -125,7 +126,14 @@ std::string whyNoBarrier(const SceneConfig& scene, std::size_t k)
       return "is the guide of cloth " + cloth.name;
   }
   const auto& tracking = scene.cloths[k].tracking;
-  return tracking && tracking->sets[0].bounds.size() > 0 ? "has a max_traction" : "";
+  if (!tracking)
+    return "";
+  if (tracking->sets[0].bounds.size() > 0)
+    return "has a max_traction";
+  const bool many = std::any_of(tracking->sets.begin(), tracking->sets.end(), [](const FunctionSet& set) {
+    return set.constraints->count() > ClothPart::kMostAverages;
+  });
+  return many ? "has more than " + std::to_string(ClothPart::kMostAverages) + " test functions" : "";
 }
 
 /// Sets the method of contact of each cloth that does not name one. Impulses are cheap, but let cloth meet nothing else
