@@ -20,8 +20,8 @@ const std::string& clearedFolder(const std::string& folder)
 {
   const auto ours = [](const std::string& name) {
     static const std::set<std::string> names = {
-        "nodes.csv",    "grasps.csv",     "bodies.csv",        "threads.csv",      "cloths.csv",
-        "tracking.csv", "rod_fields.csv", "thread_fields.csv", "cloth_fields.csv", "solid_fields.csv", "energies.csv"};
+        "nodes.csv",      "grasps.csv",        "bodies.csv",       "threads.csv",      "cloths.csv",  "tracking.csv",
+        "rod_fields.csv", "thread_fields.csv", "cloth_fields.csv", "solid_fields.csv", "energies.csv"};
     return names.count(name) > 0;
   };
   makeFolder(folder);
