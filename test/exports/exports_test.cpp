@@ -57,7 +57,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Recording{"handkerchief", "--duration 0.1", {"nodes.csv", "grasps.csv", "cloths.csv"}},
                     Recording{"obstacle_course",
                               "--duration 0.1 --set 'record.fields=[force, moment, energy, contact_force]'",
-                              {"nodes.csv", "grasps.csv", "bodies.csv", "rod_fields.csv", "energies.csv"}},
+                              {"nodes.csv", "grasps.csv", "bodies.csv", "rod_fields.csv", "solid_fields.csv",
+                               "energies.csv"}},
                     Recording{"box",
                               "--duration 0.1 --set 'tracked.0.test_functions=[{name: foot, regions: {foot: {guide: "
                               "[0..3]}}}, {name: tight, basis: subdivision, from: 0.05}]'",
