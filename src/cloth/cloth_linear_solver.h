@@ -29,8 +29,8 @@ class ClothLinearSolver
 {
 public:
   /// Measured (study implicit_step): in linearised steps sweeps are faster up to so many points, the constant factor
-  /// above. Newton's method visits strained shapes, from which the constant factor is far, and sweeps are always
-  /// faster.
+  /// above. Newton's method visits strained shapes, which the constant factor describes badly. For a
+  /// hanging sheet of 6,561 vertices sweeps took 128 s for 100 steps, and the constant factor 200 s for 50.
   static constexpr int kMostSwept = 3000;
 
   /// Model and system must outlive this. For ClothSolver::cholesky the blocks of the system contain its constant

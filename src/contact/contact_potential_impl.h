@@ -70,7 +70,7 @@ private:
   double addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness);
   double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const std::vector<Pose>& poses,
                          bool with_stiffness);
-  /// Where the body that carries the first piece is touched, for friction.
+  /// Sets the place of a contact in the frame of the body that carries the first piece. Friction needs it.
   void setOwn(Contact& contact, const std::vector<Pose>& poses) const
   {
     if (const int carrier = surface.objects[contact.object].carrier; carrier >= 0)

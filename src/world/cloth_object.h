@@ -40,7 +40,7 @@ private:
   const WorldModel& world_;
   const WorldModel::Cloth& model_;
   std::unique_ptr<ClothPart> part_;
-  std::unique_ptr<ClothStepper> stepper_;   ///< null: part_ is not
+  std::unique_ptr<ClothStepper> stepper_;   ///< null if part_ is not null
   ClothState work_;                         ///< of stepper_
   const ClothInputs* inputs_ = nullptr;     ///< of the present step
   ClothInputs tracked_inputs_;              ///< those of the world, with the averages

@@ -248,7 +248,7 @@ void ObjectIsland::addSolidLoads(SolidLoads& out) const
       out.obstacles[solid.index].add(-term.force, term.position);
     if (solid.kind == WorldSolid::Kind::body)
       out.bodies[solid.index].add(-term.force, term.position);
-    for (const BodyObject* body : bodies_)   // of which the points may be
+    for (const BodyObject* body : bodies_)   // The points may belong to one of them.
     {
       const Part& part = *body->part;
       if (const int point = term.point[0] - part.first_point; point >= 0 && point < part.points())

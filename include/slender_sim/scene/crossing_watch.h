@@ -10,8 +10,8 @@
 namespace slender {
 
 /// Notices rods, threads and cloths without contact that pass through rods, threads, cloths with contact or through
-/// simulated bodies. Bodies that are welded to a rod may be inside it. Of a cloth its edges are looked at. Cloths may
-/// pass through cloths, because guides do.
+/// simulated bodies. Bodies that are welded to a rod may be inside it. Of a cloth only the edges are
+/// checked. Pairs of cloths are not checked, because guides may pass through the cloths that follow them.
 class CrossingWatch
 {
 public:

@@ -25,10 +25,9 @@ namespace slender {
 /// - cloths.csv has a row per instant and vertex of a cloth: t, object, index, x y z, vx vy vz.
 /// - tracking.csv has a row per instant and test function of a tracked cloth or rod: t, object, function, its average
 ///   over the guide x y z, and the force with which the guide acts.
-/// - rod_fields.csv, cloth_fields.csv, solid_fields.csv and energies.csv have what `record.fields` of the scene asks
-/// for
-///   (FieldTable), in a row per instant and node or vertex (solid_fields and energies: and object). docs/quantities.md
-///   defines every column. A cell is empty if its value is not determined.
+/// - rod_fields.csv, cloth_fields.csv, solid_fields.csv and energies.csv have what `record.fields` of the scene
+///   asks for (FieldTable), in a row per instant and node or vertex (solid_fields and energies: and object).
+///   docs/quantities.md defines every column. A cell is empty if its value is not determined.
 ///
 /// With a choice of nodes, nodes.csv, cloths.csv, rod_fields.csv and cloth_fields.csv have rows of these alone, under
 /// the indices that they have in the whole object.

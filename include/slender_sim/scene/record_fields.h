@@ -15,7 +15,7 @@ enum class RecordField
   force,           ///< internal force of rods, per edge
   moment,          ///< internal moment of rods, per node
   energy,          ///< per rod, cloth and simulated body
-  contact_force,   ///< of rods and cloths, per node or vertex; of obstacles and bodies in all
+  contact_force,   ///< of rods and cloths, per node or vertex; the sum on an obstacle or a body
 };
 
 /// Every field under its name in scene files.
