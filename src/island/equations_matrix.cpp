@@ -147,9 +147,7 @@ void Equations::buildPattern()
     }
     std::array<Part::Columns, 3> rows;
     columnsOf(term, rows);
-    for (const Part::Columns& a : rows)
-      for (const Part::Columns& b : rows)
-        matrix_.notePairs(a, b);
+    matrix_.noteRows(rows.data(), 3);
   }
   const std::vector<int> blocks = numberBlocks();
   matrix_.finish(blocks, chooseSolver());
@@ -223,12 +221,7 @@ void Equations::assemble(const HessianShift& shift, bool whole)
     }
     columnsOf(term, rows);
     const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
-    for (int c = 0; c < 3; ++c)
-    {
-      matrix_.addSquare(rows[c], stiffness(c, c));
-      for (int d = 0; d < c; ++d)
-        matrix_.addPair(rows[c], rows[d], stiffness(c, d));
-    }
+    matrix_.addRows(rows.data(), 3, stiffness);
   });
   for (const ContactRow& row : contact_->rows())
   {
@@ -241,7 +234,7 @@ void Equations::assemble(const HessianShift& shift, bool whole)
       continue;
     }
     columnsOf(row, whole, rows[0]);
-    matrix_.addSquare(rows[0], row.stiffness);
+    matrix_.addRows(rows.data(), 1, row.stiffness * Eigen::Matrix3d::Identity());
   }
 }
 

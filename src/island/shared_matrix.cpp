@@ -19,6 +19,33 @@ void SharedMatrix::notePairs(const Columns& a, const Columns& b)
       note(a.index[i], b.index[j]);
 }
 
+void SharedMatrix::merge(const Columns* rows, int count, MergedRows& merged)
+{
+  merged.count = 0;
+  const auto end = [&] { return merged.unknown.begin() + merged.count; };
+  for (int r = 0; r < count; ++r)
+    for (int i = 0; i < rows[r].count; ++i)
+      if (std::find(merged.unknown.begin(), end(), rows[r].index[i]) == end())
+        merged.unknown[merged.count++] = rows[r].index[i];
+  std::sort(merged.unknown.begin(), end());
+  std::fill_n(merged.weight.begin(), merged.count, Eigen::Vector3d(0, 0, 0));
+  for (int r = 0; r < count; ++r)
+    for (int i = 0; i < rows[r].count; ++i)
+    {
+      const auto at = std::lower_bound(merged.unknown.begin(), end(), rows[r].index[i]);
+      merged.weight[at - merged.unknown.begin()][r] += rows[r].value[i];
+    }
+}
+
+void SharedMatrix::noteRows(const Columns* rows, int count)
+{
+  MergedRows merged;
+  merge(rows, count, merged);
+  for (int i = 0; i < merged.count; ++i)
+    for (int j = i; j < merged.count; ++j)
+      columns_[merged.unknown[i]].push_back(merged.unknown[j]);
+}
+
 void SharedMatrix::noteBases(const Bases& bases)
 {
   for (int i = 0; i < 4; ++i)
@@ -175,6 +202,23 @@ void SharedMatrix::addSquare(const Columns& a, double value)
   for (int i = 0; i < a.count; ++i)
     for (int j = 0; j <= i; ++j)
       add(a.index[i], a.index[j], (i != j && a.index[i] == a.index[j] ? 2.0 : 1.0) * a.value[i] * a.value[j] * value);
+}
+
+void SharedMatrix::addRows(const Columns* rows, int count, const Eigen::Matrix3d& stiffness)
+{
+  MergedRows merged;
+  merge(rows, count, merged);
+  for (int j = 0; j < merged.count; ++j)
+  {
+    const Eigen::Vector3d force = stiffness * merged.weight[j];
+    for (int i = j, at = 0; i < merged.count; ++i)
+    {
+      // The entries of unknowns that follow each other do so, too.
+      const bool follows = i > j && merged.unknown[i] == merged.unknown[i - 1] + 1;
+      at = follows ? at + 1 : index(merged.unknown[i], merged.unknown[j]);
+      values_[at] += merged.weight[i].dot(force);
+    }
+  }
 }
 
 /// block(i, j), 3 x 3, for the points i and j. A point's three rows follow each other.

@@ -50,6 +50,8 @@ public:
   void begin(int unknowns);
   void note(int a, int b) { columns_[std::min(a, b)].push_back(std::max(a, b)); }
   void notePairs(const Columns& a, const Columns& b);
+  /// Everything that these rows contain together.
+  void noteRows(const Columns* rows, int count);
   void noteBases(const Bases& bases);
   /// `blocks`: the number of the block that each unknown belongs to; only conjugate gradients need it.
   void finish(const std::vector<int>& blocks = {}, Solver solver = Solver::cholesky);
@@ -66,6 +68,8 @@ public:
   void addPair(const Columns& a, const Columns& b, double value);
   /// The diagonal entry (a, a).
   void addSquare(const Columns& a, double value);
+  /// J^T K J for at most three rows J, of which noteRows() knows, and their stiffness K.
+  void addRows(const Columns* rows, int count, const Eigen::Matrix3d& stiffness);
   /// Contacts of points with these bases, with or without the part of the second derivative that may be negative.
   void addTerm(const ContactTerm& term, const Bases& bases, bool whole);
   void addRow(const ContactRow& row, const Bases& bases, bool whole);
@@ -114,6 +118,15 @@ private:
     using Vector = std::vector<double>;
     static double dot(const Vector& x, const Vector& y);
   };
+
+  /// Some rows as a matrix: each unknown that they contain once, in ascending order, and the weights in the rows.
+  struct MergedRows
+  {
+    int count = 0;
+    std::array<int, Columns::kMost> unknown;
+    std::array<Eigen::Vector3d, Columns::kMost> weight;
+  };
+  static void merge(const Columns* rows, int count, MergedRows& merged);
 
   template <class Block>
   void addBlocks(const Bases& bases, Block&& block);
