@@ -45,8 +45,8 @@ void ClothPart::addSurface(ContactSurface& surface) const
     }
     surface.triangles.push_back(t);
   }
-  constexpr int kNoOwner = -1;   // solids that belong to one object alone belong to threads
-  surface.objects.push_back({*contact_, 0.0, false, kNoOwner, rest_, first, ignored_});
+  constexpr int kNoThread = -1;
+  surface.objects.push_back({*contact_, 0.0, false, kNoThread, rest_, first, ignored_});
 }
 
 /// A contact force that every scene meets: the weight of a vertex, or what stops it within the gap in a step.

@@ -44,6 +44,7 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
     solid = on.solid;
     const ContactSegment& s = surface.segments[on.segment];
     limit.thickness = thicknessOf(on);
+    limit.reach = rangeOf(s.object, on.solid) * options.gap;
     share =
         std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
   }

@@ -8,7 +8,6 @@
 
 #include "contact_potential_impl.h"
 #include "slender_sim/contact/distance.h"
-#include "slender_sim/contact/friction.h"
 
 namespace slender {
 
@@ -66,12 +65,6 @@ void checkSurface(const ContactSurface& surface, const ContactOptions& options)
       refuse("object " + std::to_string(i) + ": friction is negative");
   for (const ContactSolid& solid : surface.solids)
     checkShape(solid.shape);
-}
-
-template <class To, class From>
-void copyFour(To& to, const From& from)
-{
-  std::copy(std::begin(from), std::end(from), std::begin(to));
 }
 
 }   // namespace
@@ -132,7 +125,7 @@ double ContactPotential::Impl::restart()
   rows.clear();
   contacts.clear();
   largest_force = 0.0;
-  smallest_gap = kInfinity;
+  smallest_gap = smallest_share = kInfinity;
   return kInfinity;
 }
 
@@ -220,15 +213,7 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
                   s.object,
                   -1};
   setOwn(contact, poses);
-  return addContact(gap, contact, 1.0, with_stiffness);
-}
-
-double ContactPotential::Impl::frictionOf(const Contact& contact) const
-{
-  const double own = surface.objects[contact.object].friction;
-  const double other =
-      contact.solid >= 0 ? surface.solids[contact.solid].friction : surface.objects[contact.other].friction;
-  return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
+  return addContact(gap, contact, rangeOf(s.object, on.solid), with_stiffness);
 }
 
 double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness)
@@ -241,12 +226,7 @@ double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, 
   const double force = stiffness * barrier.force(g);
   copyFour(contact.weight, gap.place);
   contact.force = force * gap.weight * gap.normal;
-  terms.emplace_back();
-  ContactTerm& term = terms.back();
-  copyFour(term.point, contact.point);
-  copyFour(term.weight, contact.weight);
-  term.solid = contact.solid;
-  term.position = contact.position;
+  ContactTerm& term = addTerm(contact);
   term.force = contact.force;
   if (with_stiffness)
   {
@@ -259,8 +239,19 @@ double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, 
   }
   contacts.push_back(contact);
   largest_force = std::max(largest_force, force * gap.weight);
-  smallest_gap = std::min(smallest_gap, g);
+  smallest_gap = std::min(smallest_gap, gap.gap);
+  smallest_share = std::min(smallest_share, g / options.gap);
   return stiffness * barrier.energy(g) * scale;
+}
+
+ContactTerm& ContactPotential::Impl::addTerm(const Contact& contact)
+{
+  ContactTerm& term = terms.emplace_back();
+  copyFour(term.point, contact.point);
+  copyFour(term.weight, contact.weight);
+  term.solid = contact.solid;
+  term.position = contact.position;
+  return term;
 }
 
 /// The place of contact runs along the pieces as they turn: force r^T H^-1 r of the gap, column by column of
@@ -289,103 +280,6 @@ void ContactPotential::Impl::addMotion(const PairGap& gap, const Contact& contac
     const double l = m.h01 / m.h00;
     add(m.along[1] - l * m.along[0], m.turn[1] - l * m.turn[0], m.h11 - l * m.h01);
   }
-}
-
-double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact,
-                                           bool with_stiffness)
-{
-  const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
-  if (!(most > 0.0))
-    return 0.0;
-  terms.emplace_back();
-  ContactTerm& term = terms.back();
-  copyFour(term.point, contact.point);
-  copyFour(term.weight, contact.weight);
-  term.solid = contact.solid;
-  term.position = contact.position;
-  Eigen::Vector3d u = Eigen::Vector3d::Zero();
-  const int carrier = surface.objects[contact.object].carrier;
-  term.carried = carrier >= 0;
-  if (term.carried)
-    u = poses[carrier] * contact.own - solids_begin[carrier] * contact.own;
-  for (int i = 0; i < 4 && !term.carried; ++i)
-    if (contact.point[i] >= 0)
-      u += contact.weight[i] * (x.col(contact.point[i]) - x_begin.col(contact.point[i]));
-  if (contact.solid >= 0)
-  {
-    term.position = poses[contact.solid] * contact.material;
-    u -= term.position - solids_begin[contact.solid] * contact.material;
-  }
-  const Eigen::Vector3d n = contact.force / normal_force, slip = u - n.dot(u) * n;
-  const double y = slip.norm();
-  const SmoothedCoulomb law{options.slip_speed * h};
-  const double over_slip = law.forceOverSlip(y);
-  term.force = -most * over_slip * slip;
-  if (with_stiffness)
-  {
-    // Where a contact slips, the tangent along the slip is zero: Newton's method may jump across the narrow range in
-    // which it sticks, from slip in one direction to slip in the other, without end. So the direction of the force is
-    // an unknown of its own, which follows from the linear equations: the stiffness along the slip is then that which
-    // stops a contact at the force it needs [Chan, Golub, Mulet, A nonlinear primal-dual method for total
-    // variation-based image restoration, SIAM J. Sci. Comput. 20, 1999]. It is never longer than 1, hence the stiffness
-    // semidefinite.
-    Eigen::Matrix3d unit = over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
-    if (y > 0.0)
-    {
-      const Eigen::Vector3d along = slip / y;
-      Eigen::Vector3d direction = along;
-      if (y > law.e && contact.has_iterate)
-      {
-        direction = contact.last_force + contact.last_stiffness * (slip - contact.last_slip);
-        direction -= n.dot(direction) * n;
-        direction /= std::max(1.0, direction.norm());
-      }
-      const Eigen::Matrix3d both = direction * along.transpose();
-      unit += 0.5 * (law.slope(y) - over_slip) * (both + both.transpose());
-    }
-    contact.has_iterate = true;
-    contact.last_slip = slip;
-    contact.last_force = over_slip * slip;
-    contact.last_stiffness = unit;
-    term.stiffness = most * unit;
-  }
-  return most * law.energy(y);
-}
-
-double ContactPotential::Impl::lagFriction()
-{
-  const auto before = [](const Contact& a, const Contact& b) {
-    return a.first != b.first ? a.first < b.first : a.second < b.second;
-  };
-  double change = 0.0, largest = 0.0;
-  auto old = lagged.begin();
-  rubbing_.clear();
-  for (Contact& contact : contacts)
-  {
-    contact.friction = frictionOf(contact);
-    if (!(contact.friction > 0.0))
-      continue;
-    for (; old != lagged.end() && before(*old, contact); ++old)
-      change = std::max(change, old->force.norm());
-    const bool same = old != lagged.end() && !before(contact, *old);
-    change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
-    largest = std::max(largest, contact.force.norm());
-    if (same)
-    {
-      contact.has_iterate = old->has_iterate;
-      contact.last_slip = old->last_slip;
-      contact.last_force = old->last_force;
-      contact.last_stiffness = old->last_stiffness;
-      ++old;
-    }
-    rubbing_.push_back(contact);
-  }
-  for (; old != lagged.end(); ++old)
-    change = std::max(change, old->force.norm());
-  for (const Contact& contact : lagged)
-    largest = std::max(largest, contact.force.norm());
-  lagged.swap(rubbing_);
-  return largest > 0.0 ? change / largest : 0.0;
 }
 
 ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions& options)
@@ -420,10 +314,16 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   impl_->solids_begin = solids;
   impl_->h = h;
   impl_->evaluate(x, solids, false);
+  impl_->share_begin = impl_->smallest_share;
+  impl_->share_before = 0.0;
+  impl_->narrow = false;
   impl_->lagFriction();
 }
 
 double ContactPotential::lagFriction() { return impl_->lagFriction(); }
+const std::vector<FrictionSpring>& ContactPotential::springs() const { return impl_->springs; }
+void ContactPotential::setSprings(const std::vector<FrictionSpring>& springs) { impl_->springs = springs; }
+void ContactPotential::keepSprings(const std::vector<Pose>& solids) { impl_->keepSprings(solids); }
 
 double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
                                    const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
@@ -454,30 +354,50 @@ void ContactPotential::setMostStiffness(double force)
   impl_->most_stiffness = std::max(force, impl_->options.least_stiffness);
 }
 
-void ContactPotential::adaptStiffness()
+void ContactPotential::adaptStiffness() { impl_->adaptStiffness(); }
+bool ContactPotential::stiffen(bool converged) { return impl_->stiffen(converged); }
+
+void ContactPotential::Impl::adaptStiffness()
 {
-  // force over stiffness() at a fifth, a twelfth and half of the gap
-  const double gap = impl_->options.gap, c = impl_->barrier.force(gap / 5),
-               high = impl_->barrier.force(gap / kLeastGap), low = 1.0;
-  double& stiffness = impl_->stiffness;
-  const double share = impl_->largest_force / stiffness;
-  if (share > high)
-    stiffness = impl_->largest_force / c;
+  // force over `stiffness` at a fifth, a twelfth and half of the gap
+  const double gap = options.gap, c = barrier.force(gap / 5), high = barrier.force(gap / kLeastGap), low = 1.0;
+  const double share = largest_force / stiffness;
+  if (share > high && shrinks())
+    stiffness = largest_force / c;
   else if (share > 0.0 && share < low)   // slowly: a load that comes and goes should not find a soft barrier
-    stiffness = std::max({impl_->options.least_stiffness, 0.8 * stiffness, impl_->largest_force / c});
-  stiffness = std::min(stiffness, impl_->most_stiffness);
+    stiffness = std::max({options.least_stiffness, 0.8 * stiffness, largest_force / c});
+  stiffness = std::min(stiffness, most_stiffness);
 }
 
-bool ContactPotential::stiffen(bool converged)
+/// Whether a gap has become smaller since the step began, or is tiny, so that a stiffer barrier may open it.
+bool ContactPotential::Impl::shrinks() const
 {
-  if (smallestGap() > impl_->options.gap / kLeastGap)
+  constexpr double kLess = 0.9, kTiny = 0.02;
+  return !narrow && (smallest_share < kLess * share_begin || smallest_share < kTiny);
+}
+
+bool ContactPotential::Impl::stiffen(bool converged)
+{
+  constexpr double kOpened = 1.1;
+  if (smallest_share > 1.0 / kLeastGap || narrow)
     return false;
-  const double before = impl_->stiffness;
+  if (share_before > 0.0 && smallest_share < kOpened * share_before)
+  {
+    narrow = true;
+    stiffness = stiffness_before;
+    return true;
+  }
+  if (share_before == 0.0 && !shrinks())
+    return false;
+  const double before = stiffness;
   if (converged)
     adaptStiffness();
   else
-    setStiffness(4.0 * before);
-  return impl_->stiffness > before;
+    stiffness = std::min(4.0 * stiffness, most_stiffness);
+  if (share_before == 0.0)
+    stiffness_before = before;
+  share_before = smallest_share;
+  return stiffness > before;
 }
 
 }   // namespace slender

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <vector>
 
@@ -15,6 +17,12 @@ namespace slender {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+template <class To, class From>
+void copyFour(To& to, const From& from)
+{
+  std::copy(std::begin(from), std::end(from), std::begin(to));
+}
+
 class ContactPotential::Impl
 {
 public:
@@ -25,10 +33,12 @@ public:
     int point[4];
     double weight[4];
     int solid;
-    Eigen::Vector3d material;                        ///< in the solid's frame
-    Eigen::Vector3d position, force;                 ///< normal force on u
-    int object, other;                               ///< that touch; other: -1 for a solid
-    double friction = 0.0;                           ///< of the two, once the contact is lagged
+    Eigen::Vector3d material;          ///< in the solid's frame
+    Eigen::Vector3d position, force;   ///< normal force on u
+    int object, other;                 ///< that touch; other: -1 for a solid
+    double friction = 0.0;             ///< of the two, once the contact is lagged
+    /// Of its spring: force where the step begins, and in the last evaluation.
+    Eigen::Vector3d tension_begin = Eigen::Vector3d::Zero(), tension = Eigen::Vector3d::Zero();
     Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< the position in the frame of the carrier, if there is one
     /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
     bool has_iterate = false;
@@ -43,6 +53,9 @@ public:
                    const std::vector<Pose>& solids_end);
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double lagFriction();
+  void adaptStiffness();
+  bool stiffen(bool converged);
+  void keepSprings(const std::vector<Pose>& poses);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
   void setPieces(const ContactSurface& pieces);
@@ -58,11 +71,17 @@ public:
   Eigen::Matrix3Xd x_begin;
   std::vector<Pose> solids_begin;
   std::vector<Contact> contacts, lagged;
+  std::vector<FrictionSpring> springs;   ///< where the step begins; sorted
   std::vector<ContactTerm> terms;
   std::vector<ContactRow> rows;
   double largest_force = 0.0, smallest_gap = 0.0;
+  double smallest_share = 0.0;   ///< of the gaps at which pairs repel
+  /// The same at begin(), and before the barrier was made stiffer; 0: it was not. Its stiffness until then.
+  double share_begin = 0.0, share_before = 0.0, stiffness_before = 0.0;
+  bool narrow = false;   ///< what is stiffer opens no gap, in this step
 
 private:
+  bool shrinks() const;
   double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
   double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const std::vector<Pose>& poses,
                     bool with_stiffness);
@@ -78,8 +97,21 @@ private:
   }
   /// `scale`: of the gap at which the pair repels.
   double addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
+  /// Appends a term of a contact, without its force.
+  ContactTerm& addTerm(const Contact& contact);
   void addMotion(const PairGap& gap, const Contact& contact, double force, double own);
+  /// Share of the gap at which an object and a solid repel each other.
+  double rangeOf(int object, int solid) const
+  {
+    for (const auto& [other, share] : surface.solids[solid].ranges)
+      if (other == object)
+        return share;
+    return 1.0;
+  }
   double frictionOf(const Contact& contact) const;
+  FrictionSpring springOf(const Contact& contact) const;
+  bool turnsWithSolid(const Contact& contact) const;
+  double spin(const Contact& contact, const std::vector<Pose>& poses) const;
   double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness);
   double restart();
 

@@ -103,7 +103,7 @@ double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const 
   contact.object = face.object;
   contact.other = -1;
   setOwn(contact, poses);
-  return addContact(gap, contact, 1.0, with_stiffness);
+  return addContact(gap, contact, rangeOf(face.object, on.solid), with_stiffness);
 }
 
 double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,
@@ -129,13 +129,13 @@ double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const E
   }
   int solid = -1;
   RigidMotion rigid{Pose{}, Pose{}};
-  limit.reach = options.gap;
   for (const SheetCandidates::OnSolid& on : candidates.sheets().onSolids())
   {
     if (on.solid != solid)
       rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
     solid = on.solid;
     limit.thickness = thicknessOf(on);
+    limit.reach = rangeOf(on.face.object, on.solid) * options.gap;
     MovingPoint corner[3];
     for (int k = 0; k < on.face.corners; ++k)
       corner[k] = motion(on.face.corner[k]);

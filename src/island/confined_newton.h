@@ -75,7 +75,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   }
   for (int k = 0, failures = 0;; ++k)
   {
-    const bool good = solve(fine, 0.01);
+    const bool good = solve(fine, 1e-3);
     if (stepsInterrupted())
     {
       total.failure = StepFailure::interrupted;

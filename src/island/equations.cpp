@@ -231,7 +231,8 @@ double Equations::incrementSize() const
     largest = std::max(largest, part->incrementSize(tolerances.least_edge));
   if (!contact_)
     return largest;
-  double at_contact = 0.0;
+  constexpr double kStick = 0.3;   // of the range in which friction sticks; the increment after is far smaller
+  double at_contact = 0.0, sticking = 0.0;
   for (const ContactTerm& term : contact_->terms())
   {
     Eigen::Vector3d u = Eigen::Vector3d::Zero();
@@ -239,10 +240,13 @@ double Equations::incrementSize() const
       if (term.point[p] >= 0)
         u += term.weight[p] * partOf(term.point[p]).move(term.point[p] - partOf(term.point[p]).first_point);
     at_contact = std::max(at_contact, u.norm());
+    if (term.slip_range > 0.0)
+      sticking = std::max(sticking, u.norm() / term.slip_range);
   }
-  // a barrier is resolved when its gaps are
-  return at_contact > 0.0 ? std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_->smallestGap()))
-                          : largest;
+  // A barrier is resolved when its gaps are, and friction that sticks when the stretch of its springs is.
+  if (at_contact > 0.0)
+    largest = std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_->smallestGap()));
+  return std::max(largest, tolerance_ * sticking / kStick);
 }
 
 double Equations::slope() const

@@ -162,6 +162,7 @@ bool Island::loadContact(double h)
   constexpr double kLargest = std::numeric_limits<double>::max();
   contact->setMostStiffness(std::min(std::max(range.most, range.least), kLargest));
   contact->setStiffness(std::min(range.least, kLargest));
+  contact->setSprings(springs);
   return true;
 }
 
@@ -199,8 +200,11 @@ StepFailure Island::solveSubstep(const Substep& substep, StepReport& report)
     }
     report.residual = std::max(report.residual, newton.residual);
     report.max_strain = std::max(report.max_strain, newton.max_strain);
-    if (equations_.contact())
+    if (ContactPotential* contact = equations_.contact())
+    {
       equations_.endStage();
+      contact->keepSprings(equations_.startSolids());
+    }
     for (Part* part : parts_)
       part->endStage(s, s + 1 == plan_.stages.size(), report);
   }
@@ -272,8 +276,11 @@ void Island::accept(const Substep& substep)
     parts_[k]->acceptSubstep(substep);
     swept_[k].include(parts_[k]->surfaceBox(0.0));
   }
-  if (const ContactPotential* contact = equations_.contact())
-    stiffness_ = contact->stiffness();
+  const ContactPotential* contact = equations_.contact();
+  if (!contact)
+    return;
+  stiffness_ = contact->stiffness();
+  springs = contact->springs();
 }
 
 bool Island::shorterMayHelp(StepFailure failure) const

@@ -41,6 +41,8 @@ public:
   /// Of the barrier [N]; part of the state. 0: not chosen yet.
   double stiffness() const { return stiffness_; }
   void setStiffness(double stiffness);
+  /// Springs of friction of what sticks, see ContactPotential::springs(); part of the state.
+  std::vector<FrictionSpring> springs;
 
 private:
   bool conserves() const;

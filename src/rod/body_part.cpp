@@ -95,6 +95,7 @@ void BodyPart::addSurface(ContactSurface& surface) const
     surface.triangles.push_back({{first + t[0], first + t[1], first + t[2]}, surface_.radius, object, 0});
   surface.points += points();
   ContactObject own;
+  own.first_point = first;
   own.self = own.others = false;
   own.friction = friction_;
   own.carrier = carrier_;

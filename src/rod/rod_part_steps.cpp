@@ -87,8 +87,8 @@ void RodPart::addSurface(ContactSurface& surface) const
     start += s.length;
     surface.segments.push_back(s);
   }
-  constexpr int kNoOwner = -1;   // solids that belong to one object alone belong to threads
-  surface.objects.push_back({contact_, start, m.closed, kNoOwner, nullptr, surface.points, ignored_});
+  constexpr int kNoThread = -1;
+  surface.objects.push_back({contact_, start, m.closed, kNoThread, nullptr, surface.points, ignored_});
   surface.points += m.nodes();
 }
 

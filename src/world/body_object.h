@@ -19,7 +19,7 @@ public:
   void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override { state.bodies[index] = part->state(); }
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.bodies[index]; }
+  ContactMemory& contact(WorldState& state) const override { return state.contact.bodies[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;
 
   const std::unique_ptr<BodyPart> part;

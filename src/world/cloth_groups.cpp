@@ -76,6 +76,7 @@ public:
   }
   const Eigen::Matrix3Xd& pinForces(int cloth) const override { return group_->pinForces(cloth); }
   Eigen::Matrix3Xd clothContactForces(int cloth) const override { return group_->contactForces(cloth); }
+  void forgetContacts() override { group_->forgetContacts(); }
   void check(WorldState& state) override
   {
     const Loan<TouchingCloths> loan(*this, state);

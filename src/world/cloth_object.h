@@ -24,7 +24,7 @@ public:
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override;
   void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const override;
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.cloths[index]; }
+  ContactMemory& contact(WorldState& state) const override { return state.contact.cloths[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;
 
   /// Null: the cloth touches nothing.

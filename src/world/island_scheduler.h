@@ -31,6 +31,7 @@ public:
   void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addContacts(std::vector<ContactForce>& out) const override;
   void addSolidLoads(SolidLoads& out) const override;
+  void forgetContacts() override { islands_.clear(); }
   void setThreads(int threads) override { loop_.threads = threads; }
   const std::vector<Wrench>& wrenches(int rod) const override { return objects_.rods[rod].stepper->wrenches; }
   Eigen::Matrix3Xd rodContactForces(int rod) const override;
@@ -49,6 +50,7 @@ public:
 private:
   Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part) const;
   void checkClearance(const WorldState& state);
+  void fitRanges(const Meeting& meeting);
 
   bool endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const;
   bool begin(const WorldState& state, const WorldInputs& inputs, StepReport& report);

@@ -193,6 +193,20 @@ void IslandScheduler::checkClearance(const WorldState& state)
   if (!(room > 0))
     throw std::invalid_argument(meeting.nearest(world_.contact) + " touch or cross by " + std::to_string(-1e3 * room) +
                                 " mm as the scene starts: move them apart, or make them thinner");
+  if (room < world_.contact.gap)
+    fitRanges(meeting);
+}
+
+/// A body that starts in a narrow place is pressed by nothing there: it repels solids that are nearer than the gap
+/// within their distance only.
+void IslandScheduler::fitRanges(const Meeting& meeting)
+{
+  std::vector<const WorldObject*> bodies;   // their surfaces come first
+  for (const BodyObject& body : objects_.bodies)
+    if (body.hasSurface())
+      bodies.push_back(&body);
+  for (const Meeting::Near& near : meeting.near(static_cast<int>(bodies.size()), world_.contact))
+    objects_.solids[near.solid].ranges.emplace_back(bodies[near.object], near.room / world_.contact.gap);
 }
 
 }   // namespace slender

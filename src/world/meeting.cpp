@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "slender_sim/contact/solids.h"
+
 namespace slender {
 
 namespace {
@@ -57,18 +59,26 @@ std::vector<BoundingBox> Meeting::boxes() const
   return result;
 }
 
+/// Smallest distance between the surfaces of an object and a solid, up to the gap [m].
+double Meeting::room(int object, int solid, const ContactOptions& options) const
+{
+  ContactSurface pieces = piecesOf(surface, object, object, false);
+  pieces.solids = {surface.solids[solid]};
+  return ContactPotential(std::move(pieces), options).clearance(x, {poses[solid]});
+}
+
 std::string Meeting::nearest(const ContactOptions& options) const
 {
   double least = std::numeric_limits<double>::infinity();
   std::string names;
-  const auto note = [&](ContactSurface pieces, const std::vector<Pose>& at, const std::string& first,
-                        const std::string& second) {
-    const double room = ContactPotential(std::move(pieces), options).clearance(x, at);
-    if (room < least)
-    {
-      least = room;
-      names = first + " and " + second;
-    }
+  const auto note = [&](double room, const std::string& first, const std::string& second) {
+    if (room >= least)
+      return;
+    least = room;
+    names = first + " and " + second;
+  };
+  const auto between = [&](int a, int b, bool self) {
+    return ContactPotential(piecesOf(surface, a, b, self), options).clearance(x, {});
   };
   std::vector<BoundingBox> near = boxes();
   for (BoundingBox& box : near)
@@ -76,18 +86,31 @@ std::string Meeting::nearest(const ContactOptions& options) const
   const int count = static_cast<int>(objects.size());
   for (int a = 0; a < count; ++a)
   {
-    note(piecesOf(surface, a, a, true), {}, objects[a], "itself");
+    note(between(a, a, true), objects[a], "itself");
     for (int b = a + 1; b < count; ++b)
       if (near[a].overlaps(near[b]))
-        note(piecesOf(surface, a, b, false), {}, objects[a], objects[b]);
+        note(between(a, b, false), objects[a], objects[b]);
     for (std::size_t k = 0; k < solids.size(); ++k)
-    {
-      ContactSurface pieces = piecesOf(surface, a, a, false);
-      pieces.solids = {surface.solids[k]};
-      note(std::move(pieces), {poses[k]}, objects[a], solids[k]);
-    }
+      note(room(a, static_cast<int>(k), options), objects[a], solids[k]);
   }
   return names;
+}
+
+std::vector<Meeting::Near> Meeting::near(int count, const ContactOptions& options) const
+{
+  std::vector<Near> result;
+  const std::vector<BoundingBox> all = boxes();
+  for (int k = 0; k < static_cast<int>(solids.size()); ++k)
+  {
+    BoundingBox ball = BoundingBox::empty();
+    ball.include(poses[k].position);
+    ball.enlarge(boundingRadius(surface.solids[k].shape) + options.gap);
+    for (int a = 0; a < count; ++a)
+      if (all[a].overlaps(ball))
+        if (const double distance = room(a, k, options); distance < options.gap)
+          result.push_back({a, k, distance});
+  }
+  return result;
 }
 
 }   // namespace slender

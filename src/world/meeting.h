@@ -21,8 +21,17 @@ struct Meeting
   void addSolid(const std::string& name, const ContactSolid& solid, const Pose& pose);
   /// The two that are nearest to each other, of those that may touch: "thread 'honey' and obstacle 'plate'".
   std::string nearest(const ContactOptions& options) const;
+  /// An object and a solid, and the distance between their surfaces [m].
+  struct Near
+  {
+    int object, solid;
+    double room;
+  };
+  /// Those of the first `count` objects, and solids, that may touch and are nearer to each other than the gap.
+  std::vector<Near> near(int count, const ContactOptions& options) const;
 
 private:
+  double room(int object, int solid, const ContactOptions& options) const;
   /// Of the objects, thickness included [m].
   std::vector<BoundingBox> boxes() const;
 };

@@ -52,6 +52,8 @@ void ObjectIsland::sortObjects()
   for (const int place : places_)
   {
     objects_.push_back(shared_.all[place]);
+    if (objects_.back()->hasSurface())
+      surfaces_.push_back(objects_.back());
     if (auto* body = dynamic_cast<BodyObject*>(objects_.back()))
       bodies_.push_back(body);
     if (auto* thread = dynamic_cast<ThreadObject*>(objects_.back()))
@@ -162,13 +164,61 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
   double stiffness = 0.0;
   if (contact())
     for (const WorldObject* object : objects_)
-      stiffness = std::max(stiffness, object->stiffness(state));
+      stiffness = std::max(stiffness, object->contact(state).stiffness);
   island_.setStiffness(stiffness);
+  takeSprings(state);
   if (threads_.empty())
     return;
   setParts();
   if (contact())
     setStrands();
+}
+
+/// Takes the springs of friction between its objects, and between them and solids, with the numbers of the island. Of
+/// pairs that it does not have, nothing touches.
+void ObjectIsland::takeSprings(WorldState& state)
+{
+  island_.springs.clear();
+  if (!contact())
+    return;
+  const auto numberOf = [&](int place) {
+    const auto at = std::lower_bound(surfaces_.begin(), surfaces_.end(), place,
+                                     [](const WorldObject* object, int wanted) { return object->place < wanted; });
+    return at == surfaces_.end() || (*at)->place != place ? -1 : static_cast<int>(at - surfaces_.begin());
+  };
+  const auto solidOf = [&](int number) {
+    const WorldSolid* const solid = shared_.solids.data() + number;
+    const auto at = std::lower_bound(solids_.begin(), solids_.end(), solid);
+    return at == solids_.end() || *at != solid ? -1 : static_cast<int>(at - solids_.begin());
+  };
+  for (std::size_t k = 0; k < surfaces_.size(); ++k)
+    for (FrictionSpring spring : surfaces_[k]->contact(state).springs)
+    {
+      spring.object = static_cast<int>(k);
+      if (spring.other >= 0 && (spring.other = numberOf(spring.other)) < 0)
+        continue;
+      if (spring.solid >= 0 && (spring.solid = solidOf(spring.solid)) < 0)
+        continue;
+      island_.springs.push_back(spring);
+    }
+  std::sort(island_.springs.begin(), island_.springs.end());
+}
+
+/// Writes the springs into the state, with the numbers of the world.
+void ObjectIsland::giveSprings(WorldState& state) const
+{
+  for (const WorldObject* object : surfaces_)
+    object->contact(state).springs.clear();
+  for (FrictionSpring spring : island_.springs)
+  {
+    const WorldObject& owner = *surfaces_[spring.object];
+    spring.object = owner.place;
+    if (spring.other >= 0)
+      spring.other = surfaces_[spring.other]->place;
+    if (spring.solid >= 0)
+      spring.solid = static_cast<int>(solids_[spring.solid] - shared_.solids.data());
+    owner.contact(state).springs.push_back(spring);
+  }
 }
 
 /// Whether neither contact nor joints connect its parts.
@@ -259,9 +309,11 @@ void ObjectIsland::addSolidLoads(SolidLoads& out) const
 
 void ObjectIsland::end(WorldState& state) const
 {
-  if (contact())
-    for (const WorldObject* object : objects_)
-      object->stiffness(state) = island_.stiffness();
+  if (!contact())
+    return;
+  for (const WorldObject* object : objects_)
+    object->contact(state).stiffness = island_.stiffness();
+  giveSprings(state);
 }
 
 }   // namespace slender

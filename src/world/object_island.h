@@ -49,6 +49,8 @@ private:
   void setSolids(const WorldState& state, const WorldInputs& inputs);
   void setParts();
   void setStrands();
+  void takeSprings(WorldState& state);
+  void giveSprings(WorldState& state) const;
   bool isDivisible() const;
   void trace();
 
@@ -60,6 +62,7 @@ private:
   std::vector<ThreadObject*> threads_;
   std::vector<BodyObject*> bodies_;
   std::vector<const WorldSolid*> solids_;   ///< that its parts may touch
+  std::vector<WorldObject*> surfaces_;      ///< objects with a surface, in the order of those of the contact
   int nodes_ = 0;                           ///< of its rods
   ThreadGuard guard_;
   ThreadMerging merging_;

@@ -19,7 +19,7 @@ public:
   void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override { state.rods[index] = stepper->work; }
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.rods[index]; }
+  ContactMemory& contact(WorldState& state) const override { return state.contact.rods[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;
 
   /// Null: it may meet others, or tracks a guide.

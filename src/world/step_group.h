@@ -28,6 +28,8 @@ public:
   virtual void addContacts(std::vector<ContactForce>&) const {}
   /// Adds what they exert on obstacles and bodies.
   virtual void addSolidLoads(SolidLoads&) const {}
+  /// The state is another one: there was no last step.
+  virtual void forgetContacts() {}
   virtual void setThreads(int) {}
 
   // ---- of groups that hold rods

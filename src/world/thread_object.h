@@ -24,7 +24,7 @@ public:
   void addParts(std::vector<Part*>& parts) override;
   IslandFinder::Reach reach() const override;
   void finish(WorldState& state) override;
-  double& stiffness(WorldState& state) const override { return state.contact_stiffness.threads[index]; }
+  ContactMemory& contact(WorldState& state) const override { return state.contact.threads[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;
 
   struct Strand

@@ -143,6 +143,12 @@ public:
     return all;
   }
 
+  void forgetContacts()
+  {
+    for (const auto& group : groups_)
+      group->forgetContacts();
+  }
+
   SolidLoads solidLoads() const
   {
     SolidLoads all{std::vector<SolidLoad>(model.obstacles.size()), std::vector<SolidLoad>(model.bodies.size())};
@@ -385,6 +391,7 @@ ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eig
 
 std::vector<ContactForce> World::contacts() const { return impl_->contacts(); }
 SolidLoads World::solidLoads() const { return impl_->solidLoads(); }
+void World::forgetContacts() { impl_->forgetContacts(); }
 
 const FunctionSet& World::functions(int cloth, const WorldState& state) const
 {

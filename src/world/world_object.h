@@ -41,8 +41,8 @@ public:
   /// Writes the guide that the object tracks, and the guide's forces, into the state, whose time is the end of the
   /// step.
   virtual void finishGuide(const WorldInputs&, WorldState&, StepReport&) const {}
-  /// Of the barrier in the island that had the object last [N].
-  virtual double& stiffness(WorldState& state) const = 0;
+  /// What contact has kept of the object in the island that had it last.
+  virtual ContactMemory& contact(WorldState& state) const = 0;
   /// Appends its surface in a state, if it has one.
   virtual void addTo(Meeting& meeting, const WorldState& state) = 0;
   bool hasSurface() const { return reach().has_points; }

@@ -60,10 +60,10 @@ WorldObjects::WorldObjects(const WorldModel& model, WorldContent parts, WorldSta
   addWelds(state);
   if (!touch())
     return;
-  state.contact_stiffness.rods.resize(world.rods.size());
-  state.contact_stiffness.threads.resize(world.threads.size());
-  state.contact_stiffness.bodies.resize(world.bodies.size());
-  state.contact_stiffness.cloths.resize(world.cloths.size());
+  state.contact.rods.resize(world.rods.size());
+  state.contact.threads.resize(world.threads.size());
+  state.contact.bodies.resize(world.bodies.size());
+  state.contact.cloths.resize(world.cloths.size());
   addSolids();
 }
 
@@ -96,6 +96,9 @@ ContactSolid WorldSolid::asTouched(const std::vector<WorldObject*>& by) const
     {
       if (std::find(ignores.begin(), ignores.end(), object) != ignores.end())
         touched.ignores.push_back(number);
+      for (const auto& [near, share] : ranges)
+        if (near == object)
+          touched.ranges.emplace_back(number, share);
       ++number;
     }
   return touched;

@@ -28,6 +28,8 @@ struct WorldSolid
   BodyPart* body = nullptr;                    ///< that carries it; null: it moves as prescribed
   Pose X_BS{};                                 ///< in the frame of the body
   std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
+  /// Bodies that start so close to it that they repel each other within a share of the gap only.
+  std::vector<std::pair<const WorldObject*, double>> ranges{};
 
   /// For a contact of these objects, without the pose.
   ContactSolid asTouched(const std::vector<WorldObject*>& by) const;

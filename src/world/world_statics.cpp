@@ -83,7 +83,16 @@ void WorldStatics::take(const WorldState& state)
     work_.bodies[b] = state.bodies[b];
   work_.obstacles = state.obstacles;
   work_.obstacle_velocities = state.obstacle_velocities;
-  work_.contact_stiffness = state.contact_stiffness;
+  work_.contact = state.contact;
+  forgetSprings();
+}
+
+/// An equilibrium is sought without friction: springs would hold what rubs where it was.
+void WorldStatics::forgetSprings()
+{
+  for (auto* memories : {&work_.contact.rods, &work_.contact.bodies, &work_.contact.cloths, &work_.contact.threads})
+    for (ContactMemory& memory : *memories)
+      memory.springs.clear();
 }
 
 void WorldStatics::give(WorldState& state) const
@@ -94,7 +103,7 @@ void WorldStatics::give(WorldState& state) const
     state.bodies[b] = work_.bodies[b];
   state.obstacles = work_.obstacles;
   state.obstacle_velocities = work_.obstacle_velocities;
-  state.contact_stiffness = work_.contact_stiffness;
+  state.contact = work_.contact;
 }
 
 void WorldStatics::restore(const Configuration& c)
@@ -131,6 +140,7 @@ StepReport WorldStatics::step(double h)
   for (const BodyObject& body : objects_.bodies)
     work_.bodies[body.index] = body.part->state();
   island_.end(work_);
+  forgetSprings();
   const auto arrive = [h](const GraspTarget& target, Pose& pose, const Twist& velocity) {
     pose = poseBetween(pose, velocity, target, h, 1.0, nullptr);
   };

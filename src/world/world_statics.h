@@ -42,6 +42,7 @@ private:
   bool settle(double h);
   double unbalanced(double h) const;
   void take(const WorldState& state);
+  void forgetSprings();
   void give(WorldState& state) const;
 
   // ---- stability, world_stability.cpp

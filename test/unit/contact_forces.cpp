@@ -253,6 +253,64 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
 
+/// Springs of friction go on with the force that the last step left, which normal forces limit but do not change, and
+/// turn with what touches.
+TEST(ContactFriction, SpringsLastFromStepToStep)
+{
+  constexpr double kStep = 0.01, kFriction = 0.4;
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, kFriction);
+  surface.solids.push_back({Plane{}, kFriction, {}});
+  const std::vector<Pose> solids(1);
+  const double full = gapOptions().slip_speed * kStep;
+  const Eigen::Vector3d side(0.6, 0.8, 0);
+  ContactPotential potential(surface, gapOptions());
+  potential.setStiffness(2.0);
+  const auto forceAfter = [&](double slip) -> Eigen::Vector3d {
+    potential.begin(x, solids, kStep);
+    x.colwise() += slip * side;
+    potential.evaluate(x, solids, false);
+    const Eigen::Vector3d force = potential.terms().back().force;
+    potential.keepSprings(solids);
+    return force;
+  };
+  const Eigen::Vector3d first = forceAfter(0.4 * full);
+  EXPECT_GT(first.norm(), 0.0);
+  // slips are 1e-7 m of coordinates of 0.1 m
+  EXPECT_LT((forceAfter(0.0) - first).norm(), 1e-9 * first.norm());   // nothing moves
+  ASSERT_EQ(potential.springs().size(), 1u);
+  EXPECT_LT((potential.springs()[0].tension + first).norm(), 1e-9 * first.norm());
+  const double most = first.norm() / (1 - 0.6 * 0.6);   // the spring softens towards its largest force
+  forceAfter(5 * full);                                 // slips
+  EXPECT_NEAR(potential.springs()[0].tension.dot(side), most, 1e-9 * most);
+  forceAfter(-1.5 * full);   // and back
+  EXPECT_NEAR(potential.springs()[0].tension.dot(side), -0.75 * most, 1e-6 * most);
+  potential.setStiffness(2.0 * potential.stiffness());   // twice the normal force
+  EXPECT_NEAR(forceAfter(0.0).norm(), 0.75 * most, 1e-6 * most);
+  potential.setStiffness(0.1 * potential.stiffness());   // a fifth of it
+  EXPECT_NEAR(forceAfter(0.0).norm(), 0.2 * most, 1e-6 * most);
+
+  const Pose turned{Eigen::Vector3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()))};
+  const Eigen::Vector3d before = potential.springs()[0].tension;
+  potential.begin(x, solids, kStep);
+  potential.evaluate(turned.orientation.toRotationMatrix() * x, {turned}, false);
+  potential.keepSprings({turned});
+  EXPECT_LT((potential.springs()[0].tension - turned.orientation * before).norm(), 1e-6 * most);
+
+  potential.setSprings({});
+  potential.begin(x, solids, kStep);
+  potential.evaluate(x, solids, false);
+  EXPECT_EQ(potential.terms().back().force.norm(), 0.0);
+
+  surface.objects[0].owner = 0;   // a strand of a thread, whose pieces change
+  ContactPotential strand(surface, gapOptions());
+  strand.begin(x, solids, kStep);
+  strand.evaluate(x.colwise() + 0.4 * full * side, solids, false);
+  strand.keepSprings(solids);
+  EXPECT_TRUE(strand.springs().empty());
+}
+
 /// A contact that needs three quarters of the largest friction, from a slip that is far too large.
 TEST(ContactFriction, NewtonFindsTheNarrowRangeInWhichAContactSticks)
 {

@@ -33,8 +33,8 @@ std::string bytesOf(const WorldState& s)
   std::string bytes;
   for (const ThreadGroupState& thread : s.threads)
     bytes += stateBytes(thread);
-  for (const double stiffness : s.contact_stiffness.threads)
-    bytes += std::to_string(stiffness);
+  for (const slender::ContactMemory& memory : s.contact.threads)
+    bytes += std::to_string(memory.stiffness);
   if (s.rods.empty())
     return bytes;
   SceneState scene;   // stateBytes() takes the state of a scene; that of a world counts its steps
@@ -42,7 +42,7 @@ std::string bytesOf(const WorldState& s)
   scene.bodies = s.bodies;
   scene.obstacles = s.obstacles;
   scene.obstacle_velocities = s.obstacle_velocities;
-  scene.contact_stiffness = s.contact_stiffness;
+  scene.contact = s.contact;
   return bytes + stateBytes(scene);
 }
 /// A world with the function of the steppers; its step has the length of its model.

@@ -75,6 +75,8 @@ public:
   {
     return contact_forces_.middleCols(first_.at(cloth), first_.at(cloth + 1) - first_.at(cloth));
   }
+  /// contactForces() are zero until the next step.
+  void forgetContacts() { contact_forces_.setZero(); }
 
   /// Sums and maxima over the last step.
   const CollisionReport& collisions() const { return collisions_; }

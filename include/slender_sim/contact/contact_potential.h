@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -55,12 +56,12 @@ struct ContactObject : ContactProperties
 {
   double curve_length = 0.0;   ///< [m]
   bool closed = false;
-  int owner = 0;   ///< see ContactSolid::only
+  int owner = -1;   ///< the thread of which it is a strand, see ContactSolid::only; -1: it is none
   /// Rest positions of the points of a cloth [m]. If two pieces of the cloth are close to each other at rest, their
   /// thickness and gap are reduced, so that thickness plus gap is at most half of the distance at rest. Pieces with
   /// distance zero at rest are neighbours. With nullptr all pieces keep the whole thickness and gap.
   std::shared_ptr<const Eigen::Matrix3Xd> rest{};
-  int first_point = 0;   ///< number of the first point of the object; used for cloths and rods
+  int first_point = 0;   ///< number of the first point of the object; not needed for strands of threads
   std::shared_ptr<const std::vector<IgnoredSolid>> ignored{};   ///< nullptr: the object passes through no solid
   /// Number of the solid, if this object is the surface of a simulated body; -1 otherwise. Friction then acts where the
   /// surfaces meet. It does not act at the points of the surface, because these may lie inside of the body.
@@ -74,6 +75,9 @@ struct ContactSolid : Obstacle
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
   int number = -1;              ///< IgnoredSolid refers to this number; -1: no object ignores the solid
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
+  /// Objects that it repels within a share of the gap only, in (0, 1]. What begins closer together than the gap is
+  /// pressed by nothing then.
+  std::vector<std::pair<int, double>> ranges{};
 };
 
 struct ContactSurface
@@ -87,8 +91,10 @@ struct ContactSurface
 
 struct ContactOptions
 {
-  double gap = 0.0;           ///< distance between surfaces below which they repel [m] > 0
-  double slip_speed = 1e-4;   ///< friction sticks below it [m/s] > 0
+  double gap = 0.0;   ///< distance between surfaces below which they repel [m] > 0
+  /// [m/s] > 0: friction holds like a spring for slips up to this speed times the duration of begin(), see
+  /// FrictionSpring
+  double slip_speed = 1e-4;
   /// [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
   double least_stiffness = 1e-6;
 };
@@ -97,6 +103,22 @@ struct ContactOptions
 /// the shorter way around a closed one, is less than half a turn of the tightest bend that does not touch itself,
 /// (pi/2) (r1 + r2), plus the gap.
 bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap);
+
+/// The tangential spring of a touching pair with friction, which begins to slip where it is stretched by
+/// ContactOptions::slip_speed times the length of a step [Cundall & Strack, A discrete numerical model for granular
+/// assemblies, Geotechnique 29 (1979), 47]. From step to step it holds what sticks where it is: without memory, each
+/// step would begin with a spring that is not stretched, and what sticks would creep. The memory is a force and not a
+/// stretch, so that the force does not follow a normal force that varies.
+struct FrictionSpring
+{
+  int object = 0, other = -1;                 ///< numbers of the objects that touch; other: -1 for a solid
+  int solid = -1, piece = 0;                  ///< numbers of the solid, and of its convex piece; -1: none
+  std::array<int, 4> point{-1, -1, -1, -1};   ///< of the pair, counted in their objects; -1: unused
+  Eigen::Vector3d tension{0, 0, 0};           ///< tangential force on what the first object touches [N]
+};
+
+/// The order of springs by their pairs.
+bool operator<(const FrictionSpring& a, const FrictionSpring& b);
 
 /// Part of a touching pair's potential. With the relative displacement u = sum_i weight[i] x[point[i]] minus, if there
 /// is a solid, that of its material point at `position`, the potential has the gradient dE/du = -force and the second
@@ -112,6 +134,7 @@ struct ContactTerm
   /// of the sum over the points.
   bool carried = false;
   Eigen::Vector3d force{0, 0, 0};   ///< on u [N], friction included
+  double slip_range = 0.0;          ///< of friction that sticks: stretch at which it slips [m]; 0: other terms
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
 };
 
@@ -142,10 +165,10 @@ private:
   int after_ = 0, pause_ = 0;
 };
 
-/// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces
-/// [Li et al., Incremental Potential Contact, SIGGRAPH 2020; with thickness: Codimensional IPC, 2021]. It is infinite
-/// where surfaces meet, except where an edge has passed through the inside of a triangle. With stepLimit() the iterates
-/// of a minimisation never get to either. Memory is reused from step to step.
+/// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces and tangential
+/// springs [Li et al., Incremental Potential Contact, SIGGRAPH 2020; with thickness: Codimensional IPC, 2021]. It is
+/// infinite where surfaces meet, except where an edge has passed through the inside of a triangle. With stepLimit() the
+/// iterates of a minimisation never get to either. Memory is reused from step to step.
 ///
 /// The pairs are: two edges (segments, and edges of triangles), a point and a triangle (corners, and ends of segments),
 /// a segment and a solid, and a triangle (or its free edge or corner) and a solid. All of them have energies that are
@@ -178,11 +201,18 @@ public:
 
   /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
   /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from
-  /// earlier steps but stiffness().
+  /// earlier steps but stiffness() and springs().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
   /// of a contact's force over the largest force.
   double lagFriction();
+  /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
+  /// threads have none, because their pieces change.
+  const std::vector<FrictionSpring>& springs() const;
+  void setSprings(const std::vector<FrictionSpring>& springs);
+  /// The last evaluate() was where a step, or a stage of it, ends, with the solids at these poses. springs() become
+  /// those from which the next one begins.
+  void keepSprings(const std::vector<Pose>& solids);
 
   /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance
   /// between surfaces at least a fifth, or a fifth of the gap. Points go along straight lines; solids' origins too,
@@ -204,14 +234,16 @@ public:
   double smallestGap() const;
 
   /// Force [N] of the barrier at half the gap. adaptStiffness(), after a step, follows the largest normal force of the
-  /// last evaluate(): it aims at a smallest gap of a fifth and acts outside a twelfth to a half. Part of a simulation's
-  /// state.
+  /// last evaluate(): it aims at a smallest gap of a fifth and acts outside a twelfth to a half. It makes the barrier
+  /// stiffer only where stiffen() would. Part of a simulation's state.
   double stiffness() const;
   void setStiffness(double force);
   void adaptStiffness();
-  /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. Below a twelfth
-  /// of the gap it is made stiffer, as adaptStiffness() would where a solution has `converged`, fourfold where forces
-  /// mean nothing yet. True: it was.
+  /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. If a gap has
+  /// shrunk below a twelfth of the gap since begin(), or is below a fiftieth, the barrier is made stiffer: as
+  /// adaptStiffness() would where a solution has `converged`, fourfold where forces mean nothing yet. Gaps of what lies
+  /// in a narrow place do not open then: the next call takes the stiffness back, and it stays what it was until
+  /// begin(). Returns whether it has changed.
   bool stiffen(bool converged);
   /// From now on the stiffness stays below this [N]; no less than what it is to be set to. At first there is no such
   /// bound.

@@ -75,6 +75,8 @@ public:
   std::vector<ContactForce> contacts() const;
   /// What they exert on obstacles and bodies.
   SolidLoads solidLoads() const;
+  /// All forces of contact are zero until the next step: the state has become another one.
+  void forgetContacts();
 
   /// Test functions in force of a tracked cloth.
   const FunctionSet& functions(int cloth, const WorldState& state) const;

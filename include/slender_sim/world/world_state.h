@@ -6,6 +6,7 @@
 
 #include "slender_sim/cloth/cloth_state.h"
 #include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_state.h"
 #include "slender_sim/rod/rod_stepper.h"
@@ -24,11 +25,20 @@ struct GuideState
   FunctionBlend blend;         ///< of the set in force, which ClothState::average_set names
 };
 
-/// Stiffness of the barrier of contact per part [N]; 0: not chosen yet. Parts of one island have the same. The lists
-/// are as long as those of the state, or empty where no part can meet another one by the barrier.
-struct ContactStiffness
+/// What contact by the barrier keeps of an object from one step to the next.
+struct ContactMemory
 {
-  std::vector<double> rods, threads, bodies, cloths;
+  double stiffness = 0.0;   ///< of the barrier [N], the same for all objects of an island; 0: not chosen yet
+  /// Springs of friction with objects behind it in the order of the world, with itself, and with solids. Objects and
+  /// solids are numbered in this order.
+  std::vector<FrictionSpring> springs;
+};
+
+/// Per object. The lists are as long as those of the state, or empty where no object can meet another one by the
+/// barrier.
+struct ContactMemories
+{
+  std::vector<ContactMemory> rods, threads, bodies, cloths;
 };
 
 /// A force of contact and where it acts.
@@ -68,7 +78,7 @@ struct WorldState
   std::vector<RigidBodyState> bodies;     ///< driven ones included
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
-  ContactStiffness contact_stiffness;
+  ContactMemories contact;
   std::vector<std::array<EndLoad, 2>> end_loads;   ///< per thread, of the last step
 };
 

@@ -283,8 +283,8 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
                  "touch: 0.005 times their smallest bounding radius.")
              .number(Range::above(0, 1, "m")));
   assign(contact.slip_speed, map.get("slip_speed",
-                                     "Sliding speed below which friction sticks: it grows smoothly up to this speed "
-                                     "and is full from there on. Without the key: 1e-4 m/s.")
+                                     "Friction that sticks is a spring, which slips when it is stretched by this speed "
+                                     "times time.step. Without the key: 1e-4 m/s.")
                                  .number(Range::above(0, 10, "m/s")));
   map.finish();
   if (at.present() && !any && at.problems().size() == before)

@@ -190,8 +190,19 @@ struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::
 };
 
 template <>
-struct Fields<ContactStiffness>
-  : Members<&ContactStiffness::rods, &ContactStiffness::threads, &ContactStiffness::bodies, &ContactStiffness::cloths>
+struct Fields<FrictionSpring> : Members<&FrictionSpring::object, &FrictionSpring::other, &FrictionSpring::solid,
+                                        &FrictionSpring::piece, &FrictionSpring::point, &FrictionSpring::tension>
+{
+};
+
+template <>
+struct Fields<ContactMemory> : Members<&ContactMemory::stiffness, &ContactMemory::springs>
+{
+};
+
+template <>
+struct Fields<ContactMemories>
+  : Members<&ContactMemories::rods, &ContactMemories::threads, &ContactMemories::bodies, &ContactMemories::cloths>
 {
 };
 
@@ -199,8 +210,8 @@ template <>
 struct Fields<SceneState>
   : Members<&SceneState::time, &SceneState::steps, &SceneState::rods, &SceneState::rod_guides, &SceneState::threads,
             &SceneState::cloths, &SceneState::cloth_guides, &SceneState::bodies, &SceneState::obstacles,
-            &SceneState::obstacle_velocities, &SceneState::contact_stiffness, &SceneState::end_loads,
-            &SceneState::cloth_grasps, &SceneState::grasp_offsets, &SceneState::wrenches>
+            &SceneState::obstacle_velocities, &SceneState::contact, &SceneState::end_loads, &SceneState::cloth_grasps,
+            &SceneState::grasp_offsets, &SceneState::wrenches>
 {
 };
 

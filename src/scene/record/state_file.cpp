@@ -22,7 +22,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 18;
+constexpr std::uint64_t version = 19;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 std::string errorText(const std::string& path, const std::string& what)
@@ -144,6 +144,10 @@ std::string misfit(const SceneState& loaded, const SceneState& now, const WorldM
       loaded.cloth_grasps.size() != now.cloth_grasps.size() || loaded.bodies.size() != now.bodies.size() ||
       loaded.obstacles.size() != now.obstacles.size() ||
       loaded.obstacle_velocities.size() != now.obstacle_velocities.size() ||
+      loaded.contact.rods.size() != now.contact.rods.size() ||
+      loaded.contact.threads.size() != now.contact.threads.size() ||
+      loaded.contact.bodies.size() != now.contact.bodies.size() ||
+      loaded.contact.cloths.size() != now.contact.cloths.size() ||
       loaded.grasp_offsets.size() != now.grasp_offsets.size() || loaded.wrenches.size() != now.wrenches.size())
     return "has another number of rods, threads, cloths, bodies, obstacles or grasps";
   std::string problem;
@@ -246,6 +250,7 @@ void Simulation::load(const std::string& path)
     throw std::runtime_error(path + ": " + error.what());
   }
   state_ = std::move(loaded);
+  world_->forgetContacts();
 }
 
 }   // namespace slender

@@ -219,6 +219,7 @@ void Simulation::reset()
   if (!reset_problem_.empty())
     throw SceneError("the edited scene cannot start anew: " + reset_problem_);
   state_ = initial_;
+  world_->forgetContacts();
 }
 
 void Simulation::setFunctions(int cloth, const std::string& set, std::optional<double> blend)

@@ -231,11 +231,14 @@ void StateTransfer::take(const SceneState& before, const WorldModel& world, Scen
 
 void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
 {
-  const ContactStiffness& stiffness = before.contact_stiffness;
-  takeEntries(rods_, stiffness.rods, state.contact_stiffness.rods);
-  takeEntries(threads_, stiffness.threads, state.contact_stiffness.threads);
-  takeEntries(bodies_, stiffness.bodies, state.contact_stiffness.bodies);
-  takeEntries(cloths_, stiffness.cloths, state.contact_stiffness.cloths);
+  takeEntries(rods_, before.contact.rods, state.contact.rods);
+  takeEntries(threads_, before.contact.threads, state.contact.threads);
+  takeEntries(bodies_, before.contact.bodies, state.contact.bodies);
+  takeEntries(cloths_, before.contact.cloths, state.contact.cloths);
+  // The edited world numbers its objects and solids otherwise. Springs begin anew, without a stretch.
+  for (auto* memories : {&state.contact.rods, &state.contact.bodies, &state.contact.cloths})
+    for (ContactMemory& memory : *memories)
+      memory.springs.clear();
 
   // The welds of a rod follow its own grasps, in the order of all welds.
   const auto places = [](const SceneConfig& config) {

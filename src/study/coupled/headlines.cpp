@@ -9,6 +9,18 @@ const Figure kWorst{"worst_error_over_bound"};
 constexpr Unit kOfBound{1.0, " of the bound", 2};
 
 const HeadlineRegistration kCoupled{{
+    {"sticking",
+     "motion of boxes, cloth and ropes in ten minutes at 95 % of what friction holds",
+     {{"most_slip"}},
+     {1.0, " m", 0},
+     "Coulomb: none; bound 1e-9 m",
+     "What friction holds stays where it is, and does not creep."},
+    {"sticking",
+     "acceleration beyond the cone of friction, ropes that slip at 101 %, a ball that rolls",
+     {kWorst},
+     kOfBound,
+     "Coulomb's law; bound 1 %",
+     "What is pushed beyond the cone slips as the coefficient of friction says."},
     {"torsional_pendulum",
      "period of a disc on a wire, all integrators and steps",
      {kWorst},

@@ -237,6 +237,12 @@ const HeadlineRegistration kMotion{{
 }};
 
 const HeadlineRegistration kContact{{
+    {"capstan",
+     "tensions of a rope that is drawn over a drum by a quarter of a turn to two turns",
+     {kWorst},
+     kOfBound,
+     "exact: e^(mu angle); bound 1 %",
+     "A rope around a bollard holds what the coefficient of friction says."},
     {"stick_slip",
      "coefficient of friction at which the foot of a pressed strip slips",
      {kWorst},

@@ -1,0 +1,220 @@
+// Friction of ContactPotential: normal forces of an earlier configuration, and springs that last from step to step.
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "contact_potential_impl.h"
+#include "slender_sim/contact/friction.h"
+
+namespace slender {
+
+namespace {
+
+/// Returns the component of u across the normal n.
+Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Vector3d& u) { return u - n.dot(u) * n; }
+
+/// Returns the stretch of a spring that exerts `tension`, which was across another normal, turned across n. `most`: the
+/// largest force [N].
+Eigen::Vector3d stretchOf(const Eigen::Vector3d& tension, const Eigen::Vector3d& n, double most,
+                          const SmoothedCoulomb& law)
+{
+  constexpr double kMostTurn = 0.5;   // share that has to be left across n; less is another contact
+  const Eigen::Vector3d left = across(n, tension);
+  const double size = left.norm(), whole = tension.norm();
+  if (!(size > 0.0))
+    return Eigen::Vector3d::Zero();
+  const double force = size > kMostTurn * whole ? whole : size;
+  return law.stretchAt(std::min(1.0, force / most)) / size * left;
+}
+
+/// Returns the angle by which a solid turns between two poses about an axis of length 1 [rad].
+double turnAbout(const Eigen::Vector3d& axis, const Pose& from, const Pose& to)
+{
+  if (to.orientation.coeffs() == from.orientation.coeffs())
+    return 0.0;
+  Eigen::Quaterniond turn = to.orientation * from.orientation.conjugate();
+  if (turn.w() < 0.0)
+    turn.coeffs() = -turn.coeffs();
+  const double sine = turn.vec().norm();
+  return sine > 0.0 ? 2.0 * std::atan2(sine, turn.w()) * axis.dot(turn.vec()) / sine : 0.0;
+}
+
+}   // namespace
+
+bool operator<(const FrictionSpring& a, const FrictionSpring& b)
+{
+  const auto key = [](const FrictionSpring& s) { return std::tie(s.object, s.other, s.solid, s.piece, s.point); };
+  return key(a) < key(b);
+}
+
+double ContactPotential::Impl::frictionOf(const Contact& contact) const
+{
+  const double own = surface.objects[contact.object].friction;
+  const double other =
+      contact.solid >= 0 ? surface.solids[contact.solid].friction : surface.objects[contact.other].friction;
+  return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
+}
+
+double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact,
+                                           bool with_stiffness)
+{
+  const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
+  if (!(most > 0.0))
+    return 0.0;
+  ContactTerm& term = addTerm(contact);
+  Eigen::Vector3d u = Eigen::Vector3d::Zero();
+  const int carrier = surface.objects[contact.object].carrier;
+  term.carried = carrier >= 0;
+  if (term.carried)
+    u = poses[carrier] * contact.own - solids_begin[carrier] * contact.own;
+  for (int i = 0; i < 4 && !term.carried; ++i)
+    if (contact.point[i] >= 0)
+      u += contact.weight[i] * (x.col(contact.point[i]) - x_begin.col(contact.point[i]));
+  if (contact.solid >= 0)
+  {
+    term.position = poses[contact.solid] * contact.material;
+    u -= term.position - solids_begin[contact.solid] * contact.material;
+  }
+  const SmoothedCoulomb law{options.slip_speed * h};
+  const Eigen::Vector3d n = contact.force / normal_force;
+  Eigen::Vector3d tension = contact.tension_begin;
+  if (const double angle = turnsWithSolid(contact) ? spin(contact, poses) : 0.0; angle != 0.0)
+    tension = Eigen::AngleAxisd(angle, n) * tension;
+  const Eigen::Vector3d slip = stretchOf(tension, n, most, law) + across(n, u);
+  const double y = slip.norm(), over_slip = law.forceOverSlip(y);
+  contact.tension = most * over_slip * slip;
+  term.force = -contact.tension;
+  term.slip_range = y < law.e ? law.e : 0.0;
+  if (with_stiffness)
+  {
+    // Where a contact slips, the tangent along the slip is zero: Newton's method may jump across the narrow range in
+    // which it sticks, from slip in one direction to slip in the other, without end. So the direction of the force is
+    // an unknown of its own, which follows from the linear equations: the stiffness along the slip is then that which
+    // stops a contact at the force it needs [Chan, Golub, Mulet, A nonlinear primal-dual method for total
+    // variation-based image restoration, SIAM J. Sci. Comput. 20, 1999]. It is never longer than 1, hence the stiffness
+    // semidefinite.
+    Eigen::Matrix3d unit = over_slip * (Eigen::Matrix3d::Identity() - n * n.transpose());
+    if (y > 0.0)
+    {
+      const Eigen::Vector3d along = slip / y;
+      Eigen::Vector3d direction = along;
+      if (y > law.e && contact.has_iterate)
+      {
+        direction = contact.last_force + contact.last_stiffness * (slip - contact.last_slip);
+        direction -= n.dot(direction) * n;
+        direction /= std::max(1.0, direction.norm());
+      }
+      const Eigen::Matrix3d both = direction * along.transpose();
+      unit += 0.5 * (law.slope(y) - over_slip) * (both + both.transpose());
+    }
+    contact.has_iterate = true;
+    contact.last_slip = slip;
+    contact.last_force = over_slip * slip;
+    contact.last_stiffness = unit;
+    term.stiffness = most * unit;
+  }
+  return most * law.energy(y);
+}
+
+double ContactPotential::Impl::lagFriction()
+{
+  const auto comes_before = [](const Contact& a, const Contact& b) {
+    return a.first != b.first ? a.first < b.first : a.second < b.second;
+  };
+  double change = 0.0, largest = 0.0;
+  auto old = lagged.begin();
+  rubbing_.clear();
+  for (Contact& contact : contacts)
+  {
+    contact.friction = frictionOf(contact);
+    if (!(contact.friction > 0.0))
+      continue;
+    for (; old != lagged.end() && comes_before(*old, contact); ++old)
+      change = std::max(change, old->force.norm());
+    const bool same = old != lagged.end() && !comes_before(contact, *old);
+    change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
+    largest = std::max(largest, contact.force.norm());
+    if (same)
+    {
+      contact.has_iterate = old->has_iterate;
+      contact.last_slip = old->last_slip;
+      contact.last_force = old->last_force;
+      contact.last_stiffness = old->last_stiffness;
+      contact.tension_begin = old->tension_begin;
+      contact.tension = old->tension;
+      ++old;
+    }
+    else if (!springs.empty())
+    {
+      const FrictionSpring wanted = springOf(contact);
+      const auto spring = std::lower_bound(springs.begin(), springs.end(), wanted);
+      if (spring != springs.end() && !(wanted < *spring))
+        contact.tension = contact.tension_begin = spring->tension;
+    }
+    rubbing_.push_back(contact);
+  }
+  for (; old != lagged.end(); ++old)
+    change = std::max(change, old->force.norm());
+  for (const Contact& contact : lagged)
+    largest = std::max(largest, contact.force.norm());
+  lagged.swap(rubbing_);
+  return largest > 0.0 ? change / largest : 0.0;
+}
+
+/// The spring of a contact, without its tension.
+FrictionSpring ContactPotential::Impl::springOf(const Contact& contact) const
+{
+  FrictionSpring spring;
+  spring.object = contact.object;
+  spring.other = contact.other;
+  spring.solid = contact.solid;
+  if (contact.solid >= 0)
+    spring.piece = static_cast<int>(contact.second & 0xffffffff);
+  const auto [first, second] = std::minmax({surface.objects[contact.object].first_point,
+                                            surface.objects[std::max(contact.object, contact.other)].first_point});
+  for (int k = 0; k < 4; ++k)
+    if (const int point = contact.point[k]; point >= 0)
+      spring.point[k] = point - (point < second ? first : second);
+  return spring;
+}
+
+/// Springs turn with a solid that moves as prescribed while the step is solved, and with bodies when it has ended.
+bool ContactPotential::Impl::turnsWithSolid(const Contact& contact) const
+{
+  return contact.solid >= 0 && !surface.solids[contact.solid].body;
+}
+
+/// The angle by which a prescribed solid has turned about the normal since the step began [rad]; else the mean angle of
+/// the bodies that touch.
+double ContactPotential::Impl::spin(const Contact& contact, const std::vector<Pose>& poses) const
+{
+  const Eigen::Vector3d normal = contact.force.normalized();
+  double sum = 0.0;
+  int count = 0;
+  const int carrier = turnsWithSolid(contact) ? -1 : surface.objects[contact.object].carrier;
+  for (const int solid : {contact.solid, carrier})
+    if (solid >= 0)
+    {
+      sum += turnAbout(normal, solids_begin[solid], poses[solid]);
+      ++count;
+    }
+  return count > 0 ? sum / count : 0.0;
+}
+
+void ContactPotential::Impl::keepSprings(const std::vector<Pose>& poses)
+{
+  const auto isStrand = [&](int object) { return object >= 0 && surface.objects[object].owner >= 0; };
+  springs.clear();
+  for (const Contact& contact : lagged)
+  {
+    if (!(contact.tension.squaredNorm() > 0.0) || isStrand(contact.object) || isStrand(contact.other))
+      continue;
+    springs.push_back(springOf(contact));
+    springs.back().tension = contact.tension;
+    if (!turnsWithSolid(contact))
+      springs.back().tension = Eigen::AngleAxisd(spin(contact, poses), contact.force.normalized()) * contact.tension;
+  }
+  std::sort(springs.begin(), springs.end());
+}
+
+}   // namespace slender
