@@ -294,6 +294,11 @@ const ContactSolid& ContactPotential::solid(std::size_t number) const { return i
 
 void ContactPotential::setPieces(const ContactSurface& surface) { impl_->setPieces(surface); }
 
+void ContactPotential::setRanges(std::size_t solid, const std::vector<std::pair<int, double>>& ranges)
+{
+  impl_->surface.solids[solid].ranges = ranges;
+}
+
 bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
 {
   return impl_->thinToFit(x, solids);
@@ -394,8 +399,7 @@ bool ContactPotential::Impl::stiffen(bool converged)
     adaptStiffness();
   else
     stiffness = std::min(4.0 * stiffness, most_stiffness);
-  if (share_before == 0.0)
-    stiffness_before = before;
+  stiffness_before = before;
   share_before = smallest_share;
   return stiffness > before;
 }

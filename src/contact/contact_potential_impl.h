@@ -78,7 +78,7 @@ public:
   double smallest_share = 0.0;   ///< of the gaps at which pairs repel
   /// The same at begin(), and before the barrier was made stiffer; 0: it was not. Its stiffness until then.
   double share_begin = 0.0, share_before = 0.0, stiffness_before = 0.0;
-  bool narrow = false;   ///< what is stiffer opens no gap, in this step
+  bool narrow = false;   ///< a stiffer barrier has opened no gap, in this step
 
 private:
   bool shrinks() const;
@@ -103,10 +103,10 @@ private:
   /// Share of the gap at which an object and a solid repel each other.
   double rangeOf(int object, int solid) const
   {
-    for (const auto& [other, share] : surface.solids[solid].ranges)
-      if (other == object)
-        return share;
-    return 1.0;
+    const auto& ranges = surface.solids[solid].ranges;
+    const auto at = std::lower_bound(ranges.begin(), ranges.end(), object,
+                                     [](const auto& range, int wanted) { return range.first < wanted; });
+    return at == ranges.end() || at->first != object ? 1.0 : at->second;
   }
   double frictionOf(const Contact& contact) const;
   FrictionSpring springOf(const Contact& contact) const;

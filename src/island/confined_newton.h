@@ -81,10 +81,10 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
       total.failure = StepFailure::interrupted;
       return total;
     }
-    const bool softer = system.contact()->stiffen(good);
-    if (!good && !(softer && ++failures <= kMaxFailures))
+    const bool changed = system.contact()->stiffen(good);
+    if (!good && !(changed && ++failures <= kMaxFailures))
       return total;
-    if (good && !softer && (system.contact()->lagFriction() < kLagTolerance || k >= kMaxSolutions))
+    if (good && !changed && (system.contact()->lagFriction() < kLagTolerance || k >= kMaxSolutions))
       return total;
     system.accept();
   }

@@ -236,9 +236,13 @@ double Equations::incrementSize() const
   for (const ContactTerm& term : contact_->terms())
   {
     Eigen::Vector3d u = Eigen::Vector3d::Zero();
-    for (int p = 0; p < 4; ++p)
+    for (int p = 0; p < 4 && !term.carried; ++p)
       if (term.point[p] >= 0)
         u += term.weight[p] * partOf(term.point[p]).move(term.point[p] - partOf(term.point[p]).first_point);
+    if (term.carried)
+      u = carrierOf(term).moveAt(term.position);
+    if (const RigidPart* body = bodyOf(term.solid))
+      u -= body->moveAt(term.position);
     at_contact = std::max(at_contact, u.norm());
     if (term.slip_range > 0.0)
       sticking = std::max(sticking, u.norm() / term.slip_range);

@@ -203,7 +203,8 @@ StepFailure Island::solveSubstep(const Substep& substep, StepReport& report)
     if (ContactPotential* contact = equations_.contact())
     {
       equations_.endStage();
-      contact->keepSprings(equations_.startSolids());
+      if (plan_.fraction == 1.0)
+        contact->keepSprings(equations_.startSolids());
     }
     for (Part* part : parts_)
       part->endStage(s, s + 1 == plan_.stages.size(), report);

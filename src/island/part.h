@@ -213,6 +213,8 @@ public:
   /// The same as addColumns() and addForce(), for the body's material point at `position` (world axes).
   virtual void addColumnsAt(const Eigen::Vector3d& position, int component, double weight, Columns& row) const = 0;
   virtual void addForceAt(const Eigen::Vector3d& position, const Eigen::Vector3d& force) = 0;
+  /// Displacement of this point by the direction [m].
+  virtual Eigen::Vector3d moveAt(const Eigen::Vector3d& position) const = 0;
 };
 
 }   // namespace slender

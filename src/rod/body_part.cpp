@@ -78,9 +78,9 @@ Eigen::Matrix3Xd BodyPart::surfaceAt(const Pose& pose) const
   return x;
 }
 
-Eigen::Vector3d BodyPart::move(int point) const
+Eigen::Vector3d BodyPart::moveAt(const Eigen::Vector3d& position) const
 {
-  return direction.head<3>() + direction.tail<3>().cross(position(point) - system.pose.position);
+  return direction.head<3>() + direction.tail<3>().cross(position - system.pose.position);
 }
 
 /// Its pieces touch solids alone: rods, threads and cloths touch the solid of the body.

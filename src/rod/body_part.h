@@ -79,7 +79,8 @@ private:
     addColumnsAt(position(point), component, weight, row);
   }
   void addForce(int point, const Eigen::Vector3d& force) override { addForceAt(position(point), force); }
-  Eigen::Vector3d move(int point) const override;
+  Eigen::Vector3d move(int point) const override { return moveAt(position(point)); }
+  Eigen::Vector3d moveAt(const Eigen::Vector3d& position) const override;
 
   double stepLimit() const override;
   double incrementSize(double length) const override;

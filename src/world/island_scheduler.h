@@ -49,8 +49,8 @@ public:
 
 private:
   Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part) const;
-  void checkClearance(const WorldState& state);
-  void fitRanges(const Meeting& meeting);
+  void checkClearance(WorldState& state);
+  void fitRanges(const Meeting& meeting, WorldState& state);
 
   bool endsHaveRoom(const WorldState& state, const WorldInputs& inputs, StepReport& report) const;
   bool begin(const WorldState& state, const WorldInputs& inputs, StepReport& report);

@@ -168,7 +168,7 @@ void IslandScheduler::finish(WorldState& state, const WorldInputs& inputs, StepR
     object->finishGuide(inputs, state, report);
 }
 
-void IslandScheduler::checkClearance(const WorldState& state)
+void IslandScheduler::checkClearance(WorldState& state)
 {
   Meeting meeting;
   for (WorldObject* object : objects_.all)
@@ -190,23 +190,30 @@ void IslandScheduler::checkClearance(const WorldState& state)
           {Eigen::Vector3d(0, 0, world_.threads[index].model->floor.height), Eigen::Quaterniond::Identity()});
   }
   const double room = ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses);
-  if (!(room > 0))
-    throw std::invalid_argument(meeting.nearest(world_.contact) + " touch or cross by " + std::to_string(-1e3 * room) +
+  // Less than what rounding errors of positions leave, or barriers resolve, is none.
+  const double least = std::max(1e-9 * world_.contact.gap, 1e-11 * meeting.x.cwiseAbs().maxCoeff());
+  if (!(room > least))
+    throw std::invalid_argument(meeting.nearest(world_.contact) + " touch or cross by " +
+                                std::to_string(1e3 * std::max(0.0, -room)) +
                                 " mm as the scene starts: move them apart, or make them thinner");
-  if (room < world_.contact.gap)
-    fitRanges(meeting);
+  fitRanges(meeting, state);
 }
 
 /// A body that starts in a narrow place is pressed by nothing there: it repels solids that are nearer than the gap
 /// within their distance only.
-void IslandScheduler::fitRanges(const Meeting& meeting)
+void IslandScheduler::fitRanges(const Meeting& meeting, WorldState& state)
 {
-  std::vector<const WorldObject*> bodies;   // their surfaces come first
+  std::vector<ContactMemory*> bodies;   // their surfaces come first
   for (const BodyObject& body : objects_.bodies)
     if (body.hasSurface())
-      bodies.push_back(&body);
+    {
+      bodies.push_back(&body.contact(state));
+      bodies.back()->ranges.clear();
+    }
   for (const Meeting::Near& near : meeting.near(static_cast<int>(bodies.size()), world_.contact))
-    objects_.solids[near.solid].ranges.emplace_back(bodies[near.object], near.room / world_.contact.gap);
+    if (const WorldSolid& solid = objects_.solids[near.solid]; solid.kind != WorldSolid::Kind::floor)
+      bodies[near.object]->ranges.push_back(
+          {solid.kind == WorldSolid::Kind::body, solid.index, near.room / world_.contact.gap});
 }
 
 }   // namespace slender

@@ -166,12 +166,36 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
     for (const WorldObject* object : objects_)
       stiffness = std::max(stiffness, object->contact(state).stiffness);
   island_.setStiffness(stiffness);
+  takeRanges(state);
   takeSprings(state);
   if (threads_.empty())
     return;
   setParts();
   if (contact())
     setStrands();
+}
+
+/// Tells contact which solids the bodies repel within a share of the gap only.
+void ObjectIsland::takeRanges(WorldState& state)
+{
+  if (!contact())
+    return;
+  ranges_.resize(solids_.size());
+  for (auto& list : ranges_)
+    list.clear();
+  const auto comes_before = [](const WorldSolid* solid, const ContactRange& range) {
+    const auto kind = range.body ? WorldSolid::Kind::body : WorldSolid::Kind::obstacle;
+    return solid->kind != kind ? solid->kind < kind : solid->index < range.index;
+  };
+  for (std::size_t n = 0; n < surfaces_.size(); ++n)
+    for (const ContactRange& range : surfaces_[n]->contact(state).ranges)
+    {
+      const auto at = std::lower_bound(solids_.begin(), solids_.end(), range, comes_before);
+      if (at != solids_.end() && ((*at)->kind == WorldSolid::Kind::body) == range.body && (*at)->index == range.index)
+        ranges_[static_cast<std::size_t>(at - solids_.begin())].emplace_back(static_cast<int>(n), range.share);
+    }
+  for (std::size_t k = 0; k < solids_.size(); ++k)
+    island_.equations().contact()->setRanges(k, ranges_[k]);
 }
 
 /// Takes the springs of friction between its objects, and between them and solids, with the numbers of the island. Of

@@ -49,6 +49,7 @@ private:
   void setSolids(const WorldState& state, const WorldInputs& inputs);
   void setParts();
   void setStrands();
+  void takeRanges(WorldState& state);
   void takeSprings(WorldState& state);
   void giveSprings(WorldState& state) const;
   bool isDivisible() const;
@@ -63,7 +64,8 @@ private:
   std::vector<BodyObject*> bodies_;
   std::vector<const WorldSolid*> solids_;   ///< that its parts may touch
   std::vector<WorldObject*> surfaces_;      ///< objects with a surface, in the order of those of the contact
-  int nodes_ = 0;                           ///< of its rods
+  std::vector<std::vector<std::pair<int, double>>> ranges_;   ///< per solid, see ContactSolid::ranges
+  int nodes_ = 0;                                             ///< of its rods
   ThreadGuard guard_;
   ThreadMerging merging_;
   std::vector<Part*> parts_, single_;

@@ -96,9 +96,6 @@ ContactSolid WorldSolid::asTouched(const std::vector<WorldObject*>& by) const
     {
       if (std::find(ignores.begin(), ignores.end(), object) != ignores.end())
         touched.ignores.push_back(number);
-      for (const auto& [near, share] : ranges)
-        if (near == object)
-          touched.ranges.emplace_back(number, share);
       ++number;
     }
   return touched;

@@ -28,8 +28,6 @@ struct WorldSolid
   BodyPart* body = nullptr;                    ///< that carries it; null: it moves as prescribed
   Pose X_BS{};                                 ///< in the frame of the body
   std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
-  /// Bodies that start so close to it that they repel each other within a share of the gap only.
-  std::vector<std::pair<const WorldObject*, double>> ranges{};
 
   /// For a contact of these objects, without the pose.
   ContactSolid asTouched(const std::vector<WorldObject*>& by) const;
@@ -46,7 +44,7 @@ struct WorldContent
 
 struct WorldObjects
 {
-  /// Appends the grasps of the welds to the rods of the state, and makes room for the stiffnesses of contact. The model
+  /// Appends the grasps of the welds to the rods of the state, and makes room for what contact keeps. The model
   /// of the world must live as long.
   WorldObjects(const WorldModel& world, WorldContent content, WorldState& state);
   /// The bodies, and the rods that may meet something, for steps of another kind. The state has the grasps of the

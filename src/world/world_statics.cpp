@@ -87,7 +87,7 @@ void WorldStatics::take(const WorldState& state)
   forgetSprings();
 }
 
-/// An equilibrium is sought without friction: springs would hold what rubs where it was.
+/// Springs are forgotten after each step of the search: friction may slow the search, and holds nothing.
 void WorldStatics::forgetSprings()
 {
   for (auto* memories : {&work_.contact.rods, &work_.contact.bodies, &work_.contact.cloths, &work_.contact.threads})

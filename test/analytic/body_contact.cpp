@@ -186,6 +186,17 @@ TEST(BodyContact, ABodyFallsThroughANarrowShaft)
   }
 }
 
+/// An equilibrium leaves a body where it started: nearer to the floor than the gap.
+TEST(BodyContact, AnEquilibriumKeepsWhatStartsNearTogether)
+{
+  const std::string text = "start: equilibrium\ncontact: {gap: 0.0005}\nbodies:\n  - {name: body, mass: 1, shape: {" +
+                           kBox + "}, pose: {position: [0, 0, 0.0500001]}}\n" + kFloor;
+  Simulation s(parseScene(text));
+  EXPECT_NEAR(s.state().bodies[0].X_WB.position.z(), 0.05, 1.1e-7);   // the gap: 5e-4
+  runFor(s, 0.1);
+  EXPECT_NEAR(s.state().bodies[0].X_WB.position.z(), 0.05, 1.1e-7);
+}
+
 /// A shaft that is narrower than the gap, and is entered at 6 m/s, gives no energy.
 TEST(BodyContact, ABodyThatEntersANarrowShaftGainsNoEnergy)
 {

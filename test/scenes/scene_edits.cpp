@@ -367,6 +367,45 @@ TEST(SceneEdit, clothMeetsASpawnedBallOnceItsContactIsTheBarrier)
   EXPECT_GT(edited->state().bodies[0].X_WB.position.z(), -0.1);   // free fall: -0.4
 }
 
+/// A body repels what it started near to within that distance, and what it came near to later within the gap; edits
+/// and resets change nothing about that.
+TEST(SceneEdit, bodiesKeepTheRangesWithWhichTheyStarted)
+{
+  Running edited = make(R"(
+time: {step: 0.005}
+contact: {gap: 0.001}
+bodies:
+  - {name: near, mass: 1, shape: {box: {size: [0.1, 0.1, 0.1]}}, pose: {position: [0, 0, 0.05001]}}
+  - {name: far, mass: 1, shape: {box: {size: [0.1, 0.1, 0.1]}}, pose: {position: [0.3, 0, 0.052]}}
+obstacles:
+  - {name: floor, shape: {plane: {}}}
+)");
+  const auto share = [&](int body) {
+    const std::vector<ContactRange>& ranges = edited->state().contact.bodies[static_cast<std::size_t>(body)].ranges;
+    return ranges.size() == 1 ? ranges[0].share : static_cast<double>(ranges.size());
+  };
+  EXPECT_NEAR(share(0), 0.01, 1e-6);
+  EXPECT_EQ(share(1), 0.0);
+  const double start = share(0);
+  runSteps(*edited, 100);
+  const double height = edited->state().bodies[1].X_WB.position.z();
+  for (int k = 0; k < 3; ++k)
+  {
+    edit(edited, Kind::spawn,
+         "bodies: [{name: ball, shape: {sphere: {radius: 0.03}}, mass: 0.02, pose: {position: [0, 2, 0.03002]}}]");
+    EXPECT_NEAR(share(2), 0.02, 1e-6);
+    runSteps(*edited, 20);
+    EXPECT_EQ(share(0), start);
+    EXPECT_EQ(share(1), 0.0);
+    edit(edited, Kind::remove, "ball");
+  }
+  EXPECT_EQ(share(0), start);
+  EXPECT_NEAR(edited->state().bodies[1].X_WB.position.z(), height, 1e-6);
+  edited->reset();
+  EXPECT_EQ(share(0), start);
+  EXPECT_EQ(share(1), 0.0);
+}
+
 TEST(SceneEdit, bodiesAreWeldedToRodsThatMove)
 {
   Running edited = make(ropes), untouched = make(ropes);

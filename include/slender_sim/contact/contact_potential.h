@@ -75,8 +75,8 @@ struct ContactSolid : Obstacle
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
   int number = -1;              ///< IgnoredSolid refers to this number; -1: no object ignores the solid
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
-  /// Objects that it repels within a share of the gap only, in (0, 1]. What begins closer together than the gap is
-  /// pressed by nothing then.
+  /// Objects, in ascending order, that it repels within a share of the gap only, in (0, 1]. A pair that begins closer
+  /// together than the gap then exerts no force at first.
   std::vector<std::pair<int, double>> ranges{};
 };
 
@@ -108,7 +108,7 @@ bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const C
 /// ContactOptions::slip_speed times the length of a step [Cundall & Strack, A discrete numerical model for granular
 /// assemblies, Geotechnique 29 (1979), 47]. From step to step it holds what sticks where it is: without memory, each
 /// step would begin with a spring that is not stretched, and what sticks would creep. The memory is a force and not a
-/// stretch, so that the force does not follow a normal force that varies.
+/// stretch: a change of the normal force does not change the tangential force, below its limit.
 struct FrictionSpring
 {
   int object = 0, other = -1;                 ///< numbers of the objects that touch; other: -1 for a solid
@@ -185,6 +185,8 @@ public:
   /// Takes the points, segments, triangles, and objects of another surface, which must be sound; the solids stay. For
   /// curves that are fed and divided while they move.
   void setPieces(const ContactSurface& surface);
+  /// Takes the ranges of a solid.
+  void setRanges(std::size_t solid, const std::vector<std::pair<int, double>>& ranges);
   /// Thins segments and triangles where others, or solids, are nearer than a twentieth of the gap, or overlap: to a
   /// sixteenth of it. What was brought together by something else than motion (a division, growing radii) can so begin
   /// a step. False: two centrelines or middle surfaces, or one and a solid, meet.

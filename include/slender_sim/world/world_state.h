@@ -25,6 +25,14 @@ struct GuideState
   FunctionBlend blend;         ///< of the set in force, which ClothState::average_set names
 };
 
+/// An obstacle or a body that a body repels only within a share of the gap, because they started that close together.
+struct ContactRange
+{
+  bool body = false;    ///< else an obstacle
+  int index = 0;        ///< of the obstacle or the body
+  double share = 1.0;   ///< of the gap, in (0, 1]
+};
+
 /// What contact by the barrier keeps of an object from one step to the next.
 struct ContactMemory
 {
@@ -32,6 +40,7 @@ struct ContactMemory
   /// Springs of friction with objects behind it in the order of the world, with itself, and with solids. Objects and
   /// solids are numbered in this order.
   std::vector<FrictionSpring> springs;
+  std::vector<ContactRange> ranges;   ///< of a body, from the start on
 };
 
 /// Per object. The lists are as long as those of the state, or empty where no object can meet another one by the

@@ -196,7 +196,12 @@ struct Fields<FrictionSpring> : Members<&FrictionSpring::object, &FrictionSpring
 };
 
 template <>
-struct Fields<ContactMemory> : Members<&ContactMemory::stiffness, &ContactMemory::springs>
+struct Fields<ContactRange> : Members<&ContactRange::body, &ContactRange::index, &ContactRange::share>
+{
+};
+
+template <>
+struct Fields<ContactMemory> : Members<&ContactMemory::stiffness, &ContactMemory::springs, &ContactMemory::ranges>
 {
 };
 

@@ -229,11 +229,46 @@ void StateTransfer::take(const SceneState& before, const WorldModel& world, Scen
     throw SceneError(problem + "; this cannot change while the scene runs: start the edited scene anew");
 }
 
+/// Copies what contact keeps of bodies that stay. Their ranges to solids that stay are the old ones, and those to new
+/// solids the ones that the edited world has found.
+void StateTransfer::takeBodyContacts(const std::vector<ContactMemory>& from, std::vector<ContactMemory>& to) const
+{
+  if (from.empty() || to.empty())
+    return;
+  const auto sameSolid = [this](const ContactRange& range) {
+    return (range.body ? bodies_ : obstacles_)[static_cast<std::size_t>(range.index)];
+  };
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+  {
+    if (isNew(bodies_[b]))
+      continue;
+    const ContactMemory& old = from[static_cast<std::size_t>(bodies_[b])];
+    ContactMemory& memory = to[b];
+    memory.stiffness = old.stiffness;
+    std::vector<ContactRange>& ranges = memory.ranges;
+    ranges.erase(
+        std::remove_if(ranges.begin(), ranges.end(), [&](const auto& range) { return !isNew(sameSolid(range)); }),
+        ranges.end());
+    for (std::size_t k = 0; k < obstacles_.size() + bodies_.size(); ++k)
+    {
+      ContactRange now{k >= obstacles_.size(), static_cast<int>(k >= obstacles_.size() ? k - obstacles_.size() : k)};
+      const int index_before = sameSolid(now);
+      const auto range = std::find_if(old.ranges.begin(), old.ranges.end(), [&](const ContactRange& other) {
+        return other.body == now.body && other.index == index_before;
+      });
+      if (range == old.ranges.end())
+        continue;
+      now.share = range->share;
+      ranges.push_back(now);
+    }
+  }
+}
+
 void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
 {
   takeEntries(rods_, before.contact.rods, state.contact.rods);
   takeEntries(threads_, before.contact.threads, state.contact.threads);
-  takeEntries(bodies_, before.contact.bodies, state.contact.bodies);
+  takeBodyContacts(before.contact.bodies, state.contact.bodies);
   takeEntries(cloths_, before.contact.cloths, state.contact.cloths);
   // The edited world numbers its objects and solids otherwise. Springs begin anew, without a stretch.
   for (auto* memories : {&state.contact.rods, &state.contact.bodies, &state.contact.cloths})
