@@ -73,7 +73,7 @@ const std::vector<Plan>& plans()
        "",
        {"elastica", "torsion", "torsional_pendulum", "twist_asymmetry"},
        {"beam_frequencies", "lateral_buckling", "perversion", "wilberforce", "helical_buckling", "helical_scene",
-        "stick_slip", "knot", "plectoneme", "chain"}},
+        "body_contact", "sticking", "capstan", "stick_slip", "knot", "plectoneme", "chain"}},
       {"Threads against formulas",
        "",
        {"trouton", "thread_twist", "retraction"},

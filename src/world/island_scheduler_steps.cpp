@@ -212,8 +212,7 @@ void IslandScheduler::fitRanges(const Meeting& meeting, WorldState& state)
     }
   for (const Meeting::Near& near : meeting.near(static_cast<int>(bodies.size()), world_.contact))
     if (const WorldSolid& solid = objects_.solids[near.solid]; solid.kind != WorldSolid::Kind::floor)
-      bodies[near.object]->ranges.push_back(
-          {solid.kind == WorldSolid::Kind::body, solid.index, near.room / world_.contact.gap});
+      bodies[near.object]->ranges.push_back({solid.partner(), near.room / world_.contact.gap});
 }
 
 }   // namespace slender

@@ -53,7 +53,7 @@ void ObjectIsland::sortObjects()
   {
     objects_.push_back(shared_.all[place]);
     if (objects_.back()->hasSurface())
-      surfaces_.push_back(objects_.back());
+      addSurface(*objects_.back());
     if (auto* body = dynamic_cast<BodyObject*>(objects_.back()))
       bodies_.push_back(body);
     if (auto* thread = dynamic_cast<ThreadObject*>(objects_.back()))
@@ -73,6 +73,18 @@ void ObjectIsland::sortObjects()
   guard_.setTubes(std::move(tubes));
   if (merges)
     island_.setAttraction(&merging_);
+}
+
+void ObjectIsland::addSurface(WorldObject& object)
+{
+  const int number = static_cast<int>(surfaces_.size()), index = object.index;
+  surfaces_.push_back(&object);
+  if (dynamic_cast<ThreadObject*>(&object))
+    return;
+  const bool is_body = dynamic_cast<BodyObject*>(&object), is_rod = dynamic_cast<RodObject*>(&object);
+  partners_.push_back({is_body ? ContactPartner::body : is_rod ? ContactPartner::rod : ContactPartner::cloth, index});
+  if (!is_body)   // A body is touched as a solid.
+    numbers_.emplace_back(partners_.back(), number);
 }
 
 bool ObjectIsland::isLarge() const
@@ -96,12 +108,15 @@ std::vector<ContactSolid> ObjectIsland::takeSolids()
     if (solid.body && std::none_of(bodies_.begin(), bodies_.end(),
                                    [&](const BodyObject* body) { return body->part.get() == solid.body; }))
       continue;
+    if (solid.kind != WorldSolid::Kind::floor)
+      numbers_.emplace_back(solid.partner(), static_cast<int>(solids_.size()));
     solids_.push_back(&solid);
     solids.push_back(solid.asTouched(objects_));
     island_.equations().solids.emplace_back();
     island_.equations().solids.back().body = solid.body;
     island_.equations().solids.back().X_BS = solid.X_BS;
   }
+  std::sort(numbers_.begin(), numbers_.end());
   setCarriers();
   return solids;
 }
@@ -175,6 +190,13 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
     setStrands();
 }
 
+/// Returns the number of a rod, a cloth or a solid in the contact of the island; -1: the island does not have it.
+int ObjectIsland::numberOf(const ContactPartner& partner) const
+{
+  const auto at = std::lower_bound(numbers_.begin(), numbers_.end(), std::make_pair(partner, 0));
+  return at == numbers_.end() || !(at->first == partner) ? -1 : at->second;
+}
+
 /// Tells contact which solids the bodies repel within a share of the gap only.
 void ObjectIsland::takeRanges(WorldState& state)
 {
@@ -183,17 +205,10 @@ void ObjectIsland::takeRanges(WorldState& state)
   ranges_.resize(solids_.size());
   for (auto& list : ranges_)
     list.clear();
-  const auto comes_before = [](const WorldSolid* solid, const ContactRange& range) {
-    const auto kind = range.body ? WorldSolid::Kind::body : WorldSolid::Kind::obstacle;
-    return solid->kind != kind ? solid->kind < kind : solid->index < range.index;
-  };
   for (std::size_t n = 0; n < surfaces_.size(); ++n)
     for (const ContactRange& range : surfaces_[n]->contact(state).ranges)
-    {
-      const auto at = std::lower_bound(solids_.begin(), solids_.end(), range, comes_before);
-      if (at != solids_.end() && ((*at)->kind == WorldSolid::Kind::body) == range.body && (*at)->index == range.index)
-        ranges_[static_cast<std::size_t>(at - solids_.begin())].emplace_back(static_cast<int>(n), range.share);
-    }
+      if (const int solid = numberOf(range.partner); solid >= 0)
+        ranges_[static_cast<std::size_t>(solid)].emplace_back(static_cast<int>(n), range.share);
   for (std::size_t k = 0; k < solids_.size(); ++k)
     island_.equations().contact()->setRanges(k, ranges_[k]);
 }
@@ -205,44 +220,27 @@ void ObjectIsland::takeSprings(WorldState& state)
   island_.springs.clear();
   if (!contact())
     return;
-  const auto numberOf = [&](int place) {
-    const auto at = std::lower_bound(surfaces_.begin(), surfaces_.end(), place,
-                                     [](const WorldObject* object, int wanted) { return object->place < wanted; });
-    return at == surfaces_.end() || (*at)->place != place ? -1 : static_cast<int>(at - surfaces_.begin());
-  };
-  const auto solidOf = [&](int number) {
-    const WorldSolid* const solid = shared_.solids.data() + number;
-    const auto at = std::lower_bound(solids_.begin(), solids_.end(), solid);
-    return at == solids_.end() || *at != solid ? -1 : static_cast<int>(at - solids_.begin());
-  };
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
-    for (FrictionSpring spring : surfaces_[k]->contact(state).springs)
+    for (const ContactSpring& spring : surfaces_[k]->contact(state).springs)
     {
-      spring.object = static_cast<int>(k);
-      if (spring.other >= 0 && (spring.other = numberOf(spring.other)) < 0)
-        continue;
-      if (spring.solid >= 0 && (spring.solid = solidOf(spring.solid)) < 0)
-        continue;
-      island_.springs.push_back(spring);
+      const int number = numberOf(spring.partner);
+      const bool is_solid = spring.partner.kind >= ContactPartner::body;
+      if (number >= 0)
+        island_.springs.push_back({static_cast<int>(k), is_solid ? -1 : number, is_solid ? number : -1, spring.piece,
+                                   spring.point, spring.tension});
     }
   std::sort(island_.springs.begin(), island_.springs.end());
 }
 
-/// Writes the springs into the state, with the numbers of the world.
+/// Writes the springs into the state.
 void ObjectIsland::giveSprings(WorldState& state) const
 {
   for (const WorldObject* object : surfaces_)
     object->contact(state).springs.clear();
-  for (FrictionSpring spring : island_.springs)
-  {
-    const WorldObject& owner = *surfaces_[spring.object];
-    spring.object = owner.place;
-    if (spring.other >= 0)
-      spring.other = surfaces_[spring.other]->place;
-    if (spring.solid >= 0)
-      spring.solid = static_cast<int>(solids_[spring.solid] - shared_.solids.data());
-    owner.contact(state).springs.push_back(spring);
-  }
+  for (const FrictionSpring& spring : island_.springs)
+    surfaces_[spring.object]->contact(state).springs.push_back(
+        {spring.solid >= 0 ? solids_[spring.solid]->partner() : partners_[spring.other], spring.piece, spring.point,
+         spring.tension});
 }
 
 /// Whether neither contact nor joints connect its parts.

@@ -29,6 +29,11 @@ struct WorldSolid
   Pose X_BS{};                                 ///< in the frame of the body
   std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
 
+  /// Not of a floor.
+  ContactPartner partner() const
+  {
+    return {kind == Kind::body ? ContactPartner::body : ContactPartner::obstacle, index};
+  }
   /// For a contact of these objects, without the pose.
   ContactSolid asTouched(const std::vector<WorldObject*>& by) const;
 };

@@ -6,7 +6,6 @@
 
 #include "slender_sim/cloth/cloth_state.h"
 #include "slender_sim/cloth/cloth_stepper.h"
-#include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_state.h"
 #include "slender_sim/rod/rod_stepper.h"
@@ -25,11 +24,34 @@ struct GuideState
   FunctionBlend blend;         ///< of the set in force, which ClothState::average_set names
 };
 
+/// What an object touches, by its number in the world.
+struct ContactPartner
+{
+  enum Kind : int
+  {
+    rod,
+    cloth,
+    body,   ///< its solid
+    obstacle
+  };
+  int kind = obstacle, index = 0;
+  bool operator<(const ContactPartner& b) const { return kind != b.kind ? kind < b.kind : index < b.index; }
+  bool operator==(const ContactPartner& b) const { return kind == b.kind && index == b.index; }
+};
+
+/// A spring of friction between an object and a partner, see FrictionSpring.
+struct ContactSpring
+{
+  ContactPartner partner;
+  int piece = 0;
+  std::array<int, 4> point{-1, -1, -1, -1};
+  Eigen::Vector3d tension{0, 0, 0};   ///< [N]
+};
+
 /// An obstacle or a body that a body repels only within a share of the gap, because they started that close together.
 struct ContactRange
 {
-  bool body = false;    ///< else an obstacle
-  int index = 0;        ///< of the obstacle or the body
+  ContactPartner partner;
   double share = 1.0;   ///< of the gap, in (0, 1]
 };
 
@@ -37,9 +59,7 @@ struct ContactRange
 struct ContactMemory
 {
   double stiffness = 0.0;   ///< of the barrier [N], the same for all objects of an island; 0: not chosen yet
-  /// Springs of friction with objects behind it in the order of the world, with itself, and with solids. Objects and
-  /// solids are numbered in this order.
-  std::vector<FrictionSpring> springs;
+  std::vector<ContactSpring> springs;
   std::vector<ContactRange> ranges;   ///< of a body, from the start on
 };
 

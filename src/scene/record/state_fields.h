@@ -190,13 +190,18 @@ struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::
 };
 
 template <>
-struct Fields<FrictionSpring> : Members<&FrictionSpring::object, &FrictionSpring::other, &FrictionSpring::solid,
-                                        &FrictionSpring::piece, &FrictionSpring::point, &FrictionSpring::tension>
+struct Fields<ContactPartner> : Members<&ContactPartner::kind, &ContactPartner::index>
 {
 };
 
 template <>
-struct Fields<ContactRange> : Members<&ContactRange::body, &ContactRange::index, &ContactRange::share>
+struct Fields<ContactSpring>
+  : Members<&ContactSpring::partner, &ContactSpring::piece, &ContactSpring::point, &ContactSpring::tension>
+{
+};
+
+template <>
+struct Fields<ContactRange> : Members<&ContactRange::partner, &ContactRange::share>
 {
 };
 

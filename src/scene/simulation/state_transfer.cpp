@@ -229,51 +229,54 @@ void StateTransfer::take(const SceneState& before, const WorldModel& world, Scen
     throw SceneError(problem + "; this cannot change while the scene runs: start the edited scene anew");
 }
 
-/// Copies what contact keeps of bodies that stay. Their ranges to solids that stay are the old ones, and those to new
+/// Copies what contact keeps of the objects that stay. Ranges to solids that stay are the old ones, and those to new
 /// solids the ones that the edited world has found.
-void StateTransfer::takeBodyContacts(const std::vector<ContactMemory>& from, std::vector<ContactMemory>& to) const
+void StateTransfer::takeContacts(const std::vector<int>& same, const std::vector<ContactMemory>& from,
+                                 std::vector<ContactMemory>& to) const
 {
   if (from.empty() || to.empty())
     return;
-  const auto sameSolid = [this](const ContactRange& range) {
-    return (range.body ? bodies_ : obstacles_)[static_cast<std::size_t>(range.index)];
-  };
-  for (std::size_t b = 0; b < bodies_.size(); ++b)
-  {
-    if (isNew(bodies_[b]))
-      continue;
-    const ContactMemory& old = from[static_cast<std::size_t>(bodies_[b])];
-    ContactMemory& memory = to[b];
-    memory.stiffness = old.stiffness;
-    std::vector<ContactRange>& ranges = memory.ranges;
-    ranges.erase(
-        std::remove_if(ranges.begin(), ranges.end(), [&](const auto& range) { return !isNew(sameSolid(range)); }),
-        ranges.end());
-    for (std::size_t k = 0; k < obstacles_.size() + bodies_.size(); ++k)
+  const auto mapOf = [this](const ContactPartner& partner) -> const std::vector<int>& {
+    switch (partner.kind)
     {
-      ContactRange now{k >= obstacles_.size(), static_cast<int>(k >= obstacles_.size() ? k - obstacles_.size() : k)};
-      const int index_before = sameSolid(now);
-      const auto range = std::find_if(old.ranges.begin(), old.ranges.end(), [&](const ContactRange& other) {
-        return other.body == now.body && other.index == index_before;
-      });
-      if (range == old.ranges.end())
-        continue;
-      now.share = range->share;
-      ranges.push_back(now);
+      case ContactPartner::rod: return rods_;
+      case ContactPartner::cloth: return cloths_;
+      case ContactPartner::body: return bodies_;
+      default: return obstacles_;
     }
+  };
+  // Gives a partner its number in the edited world. Returns false if it is gone.
+  const auto renumber = [&](ContactPartner& partner) {
+    const std::vector<int>& map = mapOf(partner);
+    const auto at = std::find(map.begin(), map.end(), partner.index);
+    partner.index = static_cast<int>(at - map.begin());
+    return at != map.end();
+  };
+  for (std::size_t k = 0; k < same.size(); ++k)
+  {
+    if (isNew(same[k]))
+      continue;
+    const std::vector<ContactRange> found = to[k].ranges;
+    to[k] = from[static_cast<std::size_t>(same[k])];
+    std::vector<ContactSpring>& springs = to[k].springs;
+    springs.erase(
+        std::remove_if(springs.begin(), springs.end(), [&](auto& spring) { return !renumber(spring.partner); }),
+        springs.end());
+    std::vector<ContactRange>& ranges = to[k].ranges;
+    ranges.erase(std::remove_if(ranges.begin(), ranges.end(), [&](auto& range) { return !renumber(range.partner); }),
+                 ranges.end());
+    for (const ContactRange& range : found)
+      if (isNew(mapOf(range.partner)[static_cast<std::size_t>(range.partner.index)]))
+        ranges.push_back(range);
   }
 }
 
 void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
 {
-  takeEntries(rods_, before.contact.rods, state.contact.rods);
-  takeEntries(threads_, before.contact.threads, state.contact.threads);
-  takeBodyContacts(before.contact.bodies, state.contact.bodies);
-  takeEntries(cloths_, before.contact.cloths, state.contact.cloths);
-  // The edited world numbers its objects and solids otherwise. Springs begin anew, without a stretch.
-  for (auto* memories : {&state.contact.rods, &state.contact.bodies, &state.contact.cloths})
-    for (ContactMemory& memory : *memories)
-      memory.springs.clear();
+  takeContacts(rods_, before.contact.rods, state.contact.rods);
+  takeContacts(threads_, before.contact.threads, state.contact.threads);
+  takeContacts(bodies_, before.contact.bodies, state.contact.bodies);
+  takeContacts(cloths_, before.contact.cloths, state.contact.cloths);
 
   // The welds of a rod follow its own grasps, in the order of all welds.
   const auto places = [](const SceneConfig& config) {

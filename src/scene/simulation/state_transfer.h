@@ -38,7 +38,8 @@ public:
 private:
   bool ownerStays(const GraspRef& grasp) const;
   bool isHeldAsBefore(int rod) const;
-  void takeBodyContacts(const std::vector<ContactMemory>& from, std::vector<ContactMemory>& to) const;
+  void takeContacts(const std::vector<int>& same, const std::vector<ContactMemory>& from,
+                    std::vector<ContactMemory>& to) const;
   void takeGrasps(const SceneState& before, SceneState& state) const;
 
   const SceneConfig &from_, &to_;

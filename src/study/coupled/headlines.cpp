@@ -13,7 +13,7 @@ const HeadlineRegistration kCoupled{{
      "motion of boxes, cloth and ropes in ten minutes at 95 % of what friction holds",
      {{"most_slip"}},
      {1.0, " m", 0},
-     "Coulomb: none; bound 1e-9 m",
+     "Coulomb: none",
      "What friction holds stays where it is, and does not creep."},
     {"body_contact",
      "stacks, cards, tipping cubes, narrow shafts at up to 1,000 m/s, each shape on each shape",
