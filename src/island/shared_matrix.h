@@ -119,7 +119,8 @@ private:
     static double dot(const Vector& x, const Vector& y);
   };
 
-  /// Some rows as a matrix: each unknown that they contain once, in ascending order, and the weights in the rows.
+  /// A matrix of some rows. It has one column for each unknown that the rows contain. The unknowns are in ascending
+  /// order, and `weight` has their weights in the rows.
   struct MergedRows
   {
     int count = 0;

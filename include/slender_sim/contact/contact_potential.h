@@ -75,8 +75,8 @@ struct ContactSolid : Obstacle
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
   int number = -1;              ///< IgnoredSolid refers to this number; -1: no object ignores the solid
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
-  /// Objects, in ascending order, that it repels within a share of the gap only, in (0, 1]. A pair that begins closer
-  /// together than the gap then exerts no force at first.
+  /// Numbers of objects, in ascending order, and shares of the gap in (0, 1]. The solid repels such an object only
+  /// within this share, so that a pair that starts closer together than the gap exerts no force at first.
   std::vector<std::pair<int, double>> ranges{};
 };
 
@@ -92,8 +92,8 @@ struct ContactSurface
 struct ContactOptions
 {
   double gap = 0.0;   ///< distance between surfaces below which they repel [m] > 0
-  /// [m/s] > 0: friction holds like a spring for slips up to this speed times the duration of begin(), see
-  /// FrictionSpring
+  /// [m/s] > 0. Friction holds like a spring (see FrictionSpring) until the slip exceeds this speed times the duration
+  /// that begin() is given.
   double slip_speed = 1e-4;
   /// [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
   double least_stiffness = 1e-6;

@@ -26,7 +26,8 @@ namespace slender {
 /// - tracking.csv has a row per instant and test function of a tracked cloth or rod: t, object, function, its average
 ///   over the guide x y z, and the force with which the guide acts.
 /// - rod_fields.csv, cloth_fields.csv, solid_fields.csv and energies.csv have what `record.fields` of the scene
-///   asks for (FieldTable), in a row per instant and node or vertex (solid_fields and energies: and object).
+///   asks for (see FieldTable). The first two have a row per instant and node or vertex, and the other two a row per
+///   instant and object.
 ///   docs/quantities.md defines every column. A cell is empty if its value is not determined.
 ///
 /// With a choice of nodes, nodes.csv, cloths.csv, rod_fields.csv and cloth_fields.csv have rows of these alone, under

@@ -1,5 +1,5 @@
-// A rope that is drawn over a fixed drum: ratio of the tensions on both sides, T2 / T1 = e^(mu angle) (Euler,
-// Eytelwein).
+// A rope is drawn over a fixed drum. The study compares the ratio of the tensions on both sides with e^(mu angle), the
+// formula of Euler and Eytelwein.
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -17,8 +17,9 @@ constexpr double kDrumRadius = 0.1, kRopeRadius = 0.002, kRopeGap = 0.0002, kTen
 /// A rope wound by `angle` around a drum about z, with straight ends.
 struct WoundRope
 {
-  double angle, radius, climb;   ///< of the line of nodes: radius [m], rise per angle [m/rad]
-  double lead = 0.03;            ///< of each end [m]
+  /// The nodes lie at `radius` [m] from the axis, and rise by `climb` [m/rad] while they go around by `angle` [rad].
+  double angle, radius, climb;
+  double lead = 0.03;   ///< of each end [m]
 
   double perAngle() const { return std::hypot(radius, climb); }
   double length() const { return angle * perAngle() + 2 * lead; }
