@@ -11,7 +11,7 @@ foreach(kind unit analytic scenes)
     target_link_libraries(${kind}_tests PRIVATE slender_sim GTest::gtest GTest::gtest_main)
     slender_compile_together(${kind}_tests
       <gtest/gtest.h> <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h>)
-    target_compile_options(${kind}_tests PRIVATE $<$<CONFIG:Release>:-O1>)   # tests spend their time in the library
+    target_compile_options(${kind}_tests PRIVATE $<$<CONFIG:Release>:-Og>)   # tests spend their time in the library
     if(assimp_FOUND)
       target_compile_definitions(${kind}_tests PRIVATE SLENDER_WITH_ASSIMP)
     endif()

@@ -9,7 +9,7 @@ namespace slender {
 
 namespace {
 
-constexpr double kRounding = 1e-9;   // relative; lengths that differ by less are equal
+constexpr double kLengthRounding = 1e-9;   // relative; lengths that differ by less are equal
 
 /// Takes over the work of a substep whose result is thrown away.
 void countWork(const StepReport& substep, StepReport& report)
@@ -23,7 +23,7 @@ void countWork(const StepReport& substep, StepReport& report)
 
 double evenSubstep(double duration, double longest)
 {
-  return longest < duration ? duration / std::ceil(duration / longest * (1.0 - kRounding)) : duration;
+  return longest < duration ? duration / std::ceil(duration / longest * (1.0 - kLengthRounding)) : duration;
 }
 
 void SubstepController::run(SubstepEquations& equations, double duration, StepReport& report)
@@ -36,7 +36,7 @@ void SubstepController::run(SubstepEquations& equations, double duration, StepRe
   {
     // The last substep ends exactly with the step. It may be slightly longer than h, because a sliver after it would be
     // worse.
-    const bool last = t + h > duration * (1 - kRounding);
+    const bool last = t + h > duration * (1 - kLengthRounding);
     const double length = last ? duration - t : h;
     const Substep substep{t, last ? duration : t + length, length};
     StepReport result;
@@ -90,7 +90,8 @@ void SubstepController::run(SubstepEquations& equations, double duration, StepRe
 /// `cuts`: how often the substep was halved since the last success.
 bool SubstepController::mayHalve(double length, int cuts) const
 {
-  const double deepest = rule_.error_tolerance > 0 ? 0.0 : std::ldexp(rule_.longest, -rule_.max_cuts) * (1 - kRounding);
+  const double deepest =
+      rule_.error_tolerance > 0 ? 0.0 : std::ldexp(rule_.longest, -rule_.max_cuts) * (1 - kLengthRounding);
   return cuts < rule_.max_cuts && 0.5 * length >= std::max(deepest, rule_.min_step);
 }
 

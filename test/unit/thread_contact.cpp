@@ -440,7 +440,9 @@ TEST(TouchingThreads, ATiltedPlaneAndABeltSlipAsCoulombSays)
     const StepReport report = threads.step(belt.state, belt.inputs);
     ASSERT_TRUE(report.ok) << k << " " << report.message;
     if (k == 100)
+    {
       EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.25 * 9.81 * k * h, 0.01);
+    }
   }
   EXPECT_NEAR(belt.state.threads[0].threads[0].v[5].y(), 0.5, 1e-3);
   EXPECT_EQ(std::count(belt.state.threads[0].threads[0].deposited.begin(),

@@ -15,7 +15,7 @@ namespace {
 constexpr double kKept = 0.2;     // share of a gap that no collision may go below
 constexpr double kTarget = 0.5;   // share of the gap that impulses leave
 constexpr double kNear = 2.0;     // shells, up to where places of contact at the start tell those at the end
-constexpr int kSweeps = 25;
+constexpr int kColliderSweeps = 25;
 constexpr int kImpulseRounds = 12;
 constexpr long kLimitWork = 8;   // of a WorkBudget: when a pair meets
 
@@ -270,7 +270,7 @@ void SurfaceCollider::Impl::solveVelocities()
     row.tolerance /= h;
   }
   rows_.restart(inverse_mass_, 1.0 / h, velocity_);
-  rows_.relax(inverse_mass_, kSweeps, velocity_, *budget_);
+  rows_.relax(inverse_mass_, kColliderSweeps, velocity_, *budget_);
   takeHeldImpulses();
   if (zones_.empty())
     return;
@@ -321,12 +321,12 @@ bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd
   hits_.clear();
   if (!fine)
     return false;
-  rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
+  rows_.relax(inverse_mass_, kColliderSweeps, to_, *budget_);
   detect();
   if (!(hits_.empty() && plane_hits_.empty()))
   {
     addHits();
-    rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
+    rows_.relax(inverse_mass_, kColliderSweeps, to_, *budget_);
   }
   x = to_.leftCols(elements_.sheet_points);
   return !budget_->spent() || failSpent();
@@ -338,13 +338,13 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
   if (!load(step, x, v, again) || !examineStart() || !examinePlanes())
     return report_;
   hits_.clear();
-  rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
+  rows_.relax(inverse_mass_, kColliderSweeps, to_, *budget_);
   detect();
   while (!(hits_.empty() && plane_hits_.empty()) && report_.rounds <= kImpulseRounds && !budget_->spent() &&
          !stepsInterrupted())
   {
     addHits();
-    rows_.relax(inverse_mass_, kSweeps, to_, *budget_);
+    rows_.relax(inverse_mass_, kColliderSweeps, to_, *budget_);
     detect();
   }
   displacement_ = to_ - from_;
