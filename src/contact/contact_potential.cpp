@@ -13,7 +13,6 @@ namespace slender {
 
 namespace {
 
-constexpr double kLeastGap = 12.0;     // the gap over the smallest that barriers are to be resolved in
 constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidates are sought again
 
 [[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument("contact: " + why); }
@@ -73,10 +72,12 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
   : surface((checkSurface(s, o), std::move(s))),
     options(o),
     barrier(o.gap),
-    stiffness(o.least_stiffness),
+    stiffness(surface.objects.size()),
     margin_(o.gap)
 {
   sheets_.build(surface);
+  for (BarrierStiffness& own : stiffness)
+    own.set(0.0, {options.least_stiffness, kInfinity});
   solids.resize(surface.solids.size());
   for (std::size_t k = 0; k < solids.size(); ++k)
     std::visit(
@@ -102,6 +103,7 @@ void ContactPotential::Impl::setPieces(const ContactSurface& pieces)
   surface.segments = pieces.segments;
   surface.triangles = pieces.triangles;
   surface.objects = pieces.objects;
+  stiffness.resize(surface.objects.size());
   sheets_.build(surface);
   lagged.clear();
   contacts.clear();
@@ -125,7 +127,9 @@ double ContactPotential::Impl::restart()
   rows.clear();
   contacts.clear();
   largest_force = 0.0;
-  smallest_gap = smallest_share = kInfinity;
+  smallest_gap = kInfinity;
+  for (BarrierStiffness& own : stiffness)
+    own.restart();
   return kInfinity;
 }
 
@@ -223,7 +227,7 @@ double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, 
   const double g = gap.gap / scale;
   if (g >= options.gap)
     return 0.0;
-  const double force = stiffness * barrier.force(g);
+  const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier.force(g);
   copyFour(contact.weight, gap.place);
   contact.force = force * gap.weight * gap.normal;
   ContactTerm& term = addTerm(contact);
@@ -231,7 +235,7 @@ double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, 
   if (with_stiffness)
   {
     const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
-    const double own = stiffness * barrier.stiffness(g) / scale * gap.weight * gap.weight;
+    const double own = pair_stiffness * barrier.stiffness(g) / scale * gap.weight * gap.weight;
     term.stiffness = own * normals;
     if (contact.solid < 0)
       term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
@@ -240,8 +244,16 @@ double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, 
   contacts.push_back(contact);
   largest_force = std::max(largest_force, force * gap.weight);
   smallest_gap = std::min(smallest_gap, gap.gap);
-  smallest_share = std::min(smallest_share, g / options.gap);
-  return stiffness * barrier.energy(g) * scale;
+  for (const int object : {contact.object, contact.other})
+    if (object >= 0)
+      stiffness[object].take(force * gap.weight, pair_stiffness, g / options.gap);
+  return pair_stiffness * barrier.energy(g) * scale;
+}
+
+double ContactPotential::Impl::stiffnessOf(const Contact& contact) const
+{
+  return std::max(stiffness[contact.object].value(), contact.solid >= 0 ? surface.solids[contact.solid].least_stiffness
+                                                                        : stiffness[contact.other].value());
 }
 
 ContactTerm& ContactPotential::Impl::addTerm(const Contact& contact)
@@ -266,6 +278,7 @@ void ContactPotential::Impl::addMotion(const PairGap& gap, const Contact& contac
     rows.emplace_back();
     ContactRow& row = rows.back();
     copyFour(row.point, contact.point);
+    row.solid = contact.solid;
     Eigen::Map<Eigen::Vector4d>(row.along) = along;
     copyFour(row.across, contact.weight);
     row.normal = gap.normal;
@@ -319,9 +332,8 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   impl_->solids_begin = solids;
   impl_->h = h;
   impl_->evaluate(x, solids, false);
-  impl_->share_begin = impl_->smallest_share;
-  impl_->share_before = 0.0;
-  impl_->narrow = false;
+  for (BarrierStiffness& own : impl_->stiffness)
+    own.beginStep();
   impl_->lagFriction();
 }
 
@@ -343,65 +355,53 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
 
 const std::vector<ContactTerm>& ContactPotential::terms() const { return impl_->terms; }
 const std::vector<ContactRow>& ContactPotential::rows() const { return impl_->rows; }
+
+void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
+{
+  // The terms of friction, which follow the normal forces, stay: what slips is not carried along.
+  for (std::size_t k = 0; k < impl_->contacts.size(); ++k)
+  {
+    ContactTerm& term = impl_->terms[k];
+    if (term.solid < 0 || impl_->surface.solids[term.solid].body)
+      continue;
+    const Eigen::Vector3d motion =
+        solids_end[term.solid] * (solids[term.solid].inverse() * term.position) - term.position;
+    if (motion.dot(term.force) > 0.0)
+      term.force += term.stiffness * motion;
+  }
+}
+
 double ContactPotential::largestForce() const { return impl_->largest_force; }
 double ContactPotential::smallestGap() const { return impl_->smallest_gap; }
-double ContactPotential::stiffness() const { return impl_->stiffness; }
+double ContactPotential::stiffness(int object) const { return impl_->stiffness[object].value(); }
+
+void ContactPotential::setStiffness(int object, double force, const BarrierRange& range)
+{
+  if (!(force >= 0.0) || !std::isfinite(force))
+    throw std::invalid_argument("contact: stiffness is " + std::to_string(force) +
+                                " N; must be finite and not negative");
+  impl_->stiffness[object].set(force, {std::max(range.least, impl_->options.least_stiffness),
+                                       std::max(range.most, impl_->options.least_stiffness)});
+}
 
 void ContactPotential::setStiffness(double force)
 {
-  if (!(force > 0.0) || !std::isfinite(force))
-    throw std::invalid_argument("contact: stiffness is " + std::to_string(force) + " N; must be positive and finite");
-  impl_->stiffness = std::min(std::max(force, impl_->options.least_stiffness), impl_->most_stiffness);
+  for (std::size_t object = 0; object < impl_->stiffness.size(); ++object)
+    setStiffness(static_cast<int>(object), force);
 }
 
-void ContactPotential::setMostStiffness(double force)
+void ContactPotential::adaptStiffness()
 {
-  impl_->most_stiffness = std::max(force, impl_->options.least_stiffness);
+  for (BarrierStiffness& own : impl_->stiffness)
+    own.adapt(impl_->barrier);
 }
 
-void ContactPotential::adaptStiffness() { impl_->adaptStiffness(); }
-bool ContactPotential::stiffen(bool converged) { return impl_->stiffen(converged); }
-
-void ContactPotential::Impl::adaptStiffness()
+bool ContactPotential::stiffen(bool converged)
 {
-  // force over `stiffness` at a fifth, a twelfth and half of the gap
-  const double gap = options.gap, c = barrier.force(gap / 5), high = barrier.force(gap / kLeastGap), low = 1.0;
-  const double share = largest_force / stiffness;
-  if (share > high && shrinks())
-    stiffness = largest_force / c;
-  else if (share > 0.0 && share < low)   // slowly: a load that comes and goes should not find a soft barrier
-    stiffness = std::max({options.least_stiffness, 0.8 * stiffness, largest_force / c});
-  stiffness = std::min(stiffness, most_stiffness);
-}
-
-/// Whether a gap has become smaller since the step began, or is tiny, so that a stiffer barrier may open it.
-bool ContactPotential::Impl::shrinks() const
-{
-  constexpr double kLess = 0.9, kTiny = 0.02;
-  return !narrow && (smallest_share < kLess * share_begin || smallest_share < kTiny);
-}
-
-bool ContactPotential::Impl::stiffen(bool converged)
-{
-  constexpr double kOpened = 1.1;
-  if (smallest_share > 1.0 / kLeastGap || narrow)
-    return false;
-  if (share_before > 0.0 && smallest_share < kOpened * share_before)
-  {
-    narrow = true;
-    stiffness = stiffness_before;
-    return true;
-  }
-  if (share_before == 0.0 && !shrinks())
-    return false;
-  const double before = stiffness;
-  if (converged)
-    adaptStiffness();
-  else
-    stiffness = std::min(4.0 * stiffness, most_stiffness);
-  stiffness_before = before;
-  share_before = smallest_share;
-  return stiffness > before;
+  bool changed = false;
+  for (BarrierStiffness& own : impl_->stiffness)
+    changed = own.stiffen(impl_->barrier, converged) || changed;
+  return changed;
 }
 
 }   // namespace slender

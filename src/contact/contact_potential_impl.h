@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "barrier_stiffness.h"
 #include "candidates.h"
 #include "slender_sim/contact/barrier.h"
 #include "slender_sim/contact/contact_potential.h"
@@ -53,8 +54,6 @@ public:
                    const std::vector<Pose>& solids_end);
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double lagFriction();
-  void adaptStiffness();
-  bool stiffen(bool converged);
   void keepSprings(const std::vector<Pose>& poses);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
@@ -64,7 +63,7 @@ public:
   ContactSurface surface;
   ContactOptions options;
   Barrier barrier;
-  double stiffness, most_stiffness = std::numeric_limits<double>::infinity();
+  std::vector<BarrierStiffness> stiffness;   ///< per object
   std::vector<SolidPieces> solids;
 
   double h = 0.0;
@@ -75,13 +74,8 @@ public:
   std::vector<ContactTerm> terms;
   std::vector<ContactRow> rows;
   double largest_force = 0.0, smallest_gap = 0.0;
-  double smallest_share = 0.0;   ///< of the gaps at which pairs repel
-  /// The same at begin(), and before the barrier was made stiffer; 0: it was not. Its stiffness until then.
-  double share_begin = 0.0, share_before = 0.0, stiffness_before = 0.0;
-  bool narrow = false;   ///< a stiffer barrier has opened no gap, in this step
 
 private:
-  bool shrinks() const;
   double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
   double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const std::vector<Pose>& poses,
                     bool with_stiffness);
@@ -109,6 +103,7 @@ private:
     return at == ranges.end() || at->first != object ? 1.0 : at->second;
   }
   double frictionOf(const Contact& contact) const;
+  double stiffnessOf(const Contact& contact) const;
   FrictionSpring springOf(const Contact& contact) const;
   bool turnsWithSolid(const Contact& contact) const;
   double spin(const Contact& contact, const std::vector<Pose>& poses) const;

@@ -24,7 +24,7 @@ enum class Approach
 /// System offers what minimize() needs, and:
 /// - approach(from, to, reached): goes from the base towards the present trial, as far as nothing touches. That
 ///   becomes the base, where all that is prescribed stands at the fraction `reached`;
-/// - placeHeld(to): what is held or driven, in the trial, where it is at `to`;
+/// - advance(to): puts what is held or driven, in the trial, where it is at `to`, and moves along what it pushes;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
 /// - contact(): the ContactPotential.
 template <class System>
@@ -51,6 +51,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   // resolve.
   NewtonConfig fine = newton, loose = newton;
   fine.tolerance = std::max(newton.tolerance, 1e-3 * gap);
+  fine.max_iterations = 2 * newton.max_iterations;   // contacts that come and go cost more than a substep cut in two
   loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
   loose.max_iterations = 12;
   for (int k = 0;; ++k)
@@ -71,7 +72,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
       return total;
     system.accept();
     from = reached;
-    system.placeHeld(to);
+    system.advance(to);
   }
   for (int k = 0, failures = 0;; ++k)
   {

@@ -91,10 +91,35 @@ void Equations::follow()
 
 bool Equations::solidsMove() const
 {
-  return std::any_of(solids.begin(), solids.end(), [](const IslandSolid& s) {
+  const auto moves = [](const std::optional<Twist>& v) {
+    return v && (v->linear.squaredNorm() > 0.0 || v->angular.squaredNorm() > 0.0);
+  };
+  return std::any_of(solids.begin(), solids.end(), [&](const IslandSolid& s) {
     return !s.body && (s.start.position != s.target.X_WG.position ||
-                       s.start.orientation.coeffs() != s.target.X_WG.orientation.coeffs() || s.target.velocity);
+                       s.start.orientation.coeffs() != s.target.X_WG.orientation.coeffs() || moves(s.target.velocity));
   });
+}
+
+/// From the base, at which what gave way has come to rest: without a prediction, contact would block the motion again
+/// after a part of the gap.
+void Equations::advance(double to)
+{
+  if (solidsMove())
+  {
+    placeSolids(to, poses_end_);
+    pushing_ = true;
+    const RodEvaluation trial = evaluate(true);
+    pushing_ = false;
+    if (std::isfinite(trial.energy()) && trial.inertia.positiveDefinite())
+    {
+      solve();
+      double alpha = 1.0;
+      for (const Part* part : parts_)
+        alpha = std::min(alpha, part->stepLimit());
+      forParts([&](Part& part) { part.moveAlong(alpha); });
+    }
+  }
+  place(to);
 }
 
 // ---- a step

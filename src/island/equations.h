@@ -119,7 +119,7 @@ private:
   double residual() const;
   double noiseLevel() const;
   Approach approach(double from, double to, double& reached);
-  void placeHeld(double to) { place(to); }
+  void advance(double to);
   void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
 
   /// Four points and a solid of a contact that couples unknowns.
@@ -179,6 +179,7 @@ private:
   std::vector<Pose> prescribed_;   ///< per solid that no part carries, at the instant being solved for
   Eigen::Matrix3Xd points_, points_base_, points_end_;
   std::vector<Pose> poses_, poses_base_, poses_end_;   ///< of solids
+  bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
 };

@@ -109,6 +109,9 @@ void Equations::columnsOf(const ContactRow& contact, bool whole, Part::Columns& 
         contact.along[p] * contact.normal + (whole ? contact.across[p] : 0.0) * contact.turning;
     for (int c = 0; c < 3; ++c)
       part.addColumns(contact.point[p] - part.first_point, c, weights[c], row);
+    if (const RigidPart* body = bodyOf(contact.solid))
+      for (int c = 0; c < 3; ++c)
+        body->addColumnsAt(points_.col(contact.point[p]), c, -weights[c], row);
   }
 }
 
@@ -228,7 +231,7 @@ void Equations::assemble(const HessianShift& shift, bool whole)
     if (!partOf(row.point[0]).coupled)
       continue;
     const SharedMatrix::Bases bases = basesOf(row.point);
-    if (!isCarried(bases, -1))
+    if (!isCarried(bases, row.solid))
     {
       matrix_.addRow(row, bases, whole);
       continue;
@@ -255,6 +258,8 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
     sum.potential = contact_->evaluate(points_, poses_, with_hessian);
     if (!std::isfinite(sum.potential))
       return sum;
+    if (pushing_)
+      contact_->pushTerms(poses_, poses_end_);
     if (attraction_)
       sum.potential += attraction_->evaluate(points_, with_hessian);
     take();

@@ -14,6 +14,7 @@ void Island::setParts(const std::vector<Part*>& parts)
   if (parts != parts_)
     versions_.clear();   // of another surface
   parts_ = parts;
+  stiffness_.resize(parts_.size());
   surface_changes_ = std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->surfaceChanges(); });
   equations_.setParts(parts_);
 }
@@ -25,9 +26,12 @@ void Island::takeSurface()
   surface_.triangles.clear();
   surface_.objects.clear();
   versions_.clear();
+  object_.clear();
   for (Part* part : parts_)
   {
+    const int object = static_cast<int>(surface_.objects.size());
     part->addSurface(surface_);
+    object_.push_back(object < static_cast<int>(surface_.objects.size()) ? object : -1);
     versions_.push_back(part->surfaceVersion());
   }
 }
@@ -47,13 +51,11 @@ void Island::setContact(const std::vector<ContactSolid>& solids, const ContactOp
   takeSurface();
   ContactSurface surface = surface_;
   surface.solids = solids;
-  ContactOptions own = options;
-  for (const Part* part : parts_)
-    if (!part->surfaceChanges())
-      own.least_stiffness = std::max(own.least_stiffness, part->barrierRange(options.gap).least);
-  equations_.setContact(std::move(surface), own);
+  for (std::size_t k = 0; k < solids.size(); ++k)
+    if (const RigidPart* body = equations_.solids[k].body)
+      surface.solids[k].least_stiffness = body->barrierRange(options.gap).least;
+  equations_.setContact(std::move(surface), options);
   gap_ = options.gap;
-  first_stiffness_ = equations_.contact()->stiffness();
 }
 
 void Island::setAttraction(SubstepPotential* attraction)
@@ -62,7 +64,19 @@ void Island::setAttraction(SubstepPotential* attraction)
   equations_.setAttraction(attraction);
 }
 
-void Island::setStiffness(double stiffness) { stiffness_ = stiffness > 0.0 ? stiffness : first_stiffness_; }
+void Island::loadStiffness(double least)
+{
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+  {
+    if (object_[k] < 0)
+      continue;
+    BarrierRange range = parts_[k]->barrierRange(gap_);
+    if (parts_[k]->surfaceChanges())
+      range.least = std::max(range.least, least);
+    range.most = std::max(range.least, range.most);
+    equations_.contact()->setStiffness(object_[k], stiffness_[k], range);
+  }
+}
 
 // ---- a step
 
@@ -137,15 +151,6 @@ bool Island::loadContact(double h)
   ContactPotential* contact = equations_.contact();
   if (!contact)
     return true;
-  BarrierRange range{stiffness_, 0.0};   // not what an attempt that failed left
-  if (!surface_changes_)
-    range.most = std::numeric_limits<double>::infinity();
-  for (Part* part : parts_)
-  {
-    const BarrierRange own = part->barrierRange(gap_);
-    range.least = std::max(range.least, surface_changes_ ? own.least : 0.0);
-    range.most = std::max(range.most, own.most);
-  }
   if (surface_changes_ || surfaceIsStale())
   {
     takeSurface();
@@ -156,12 +161,8 @@ bool Island::loadContact(double h)
   if (attraction_)
   {
     attraction_->begin(equations_.startPoints(), surface_, contact->nearPairs(), gap_, h);
-    range.least = std::max(range.least, attraction_->largestForce());
   }
-  // of loads that overflow: what they do to the parts says why
-  constexpr double kLargest = std::numeric_limits<double>::max();
-  contact->setMostStiffness(std::min(std::max(range.most, range.least), kLargest));
-  contact->setStiffness(std::min(range.least, kLargest));
+  loadStiffness(attraction_ ? attraction_->largestForce() : 0.0);   // not what an attempt that failed left
   contact->setSprings(springs);
   return true;
 }
@@ -280,7 +281,9 @@ void Island::accept(const Substep& substep)
   const ContactPotential* contact = equations_.contact();
   if (!contact)
     return;
-  stiffness_ = contact->stiffness();
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    if (object_[k] >= 0)
+      stiffness_[k] = contact->stiffness(object_[k]);
   springs = contact->springs();
 }
 

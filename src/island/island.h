@@ -38,9 +38,11 @@ public:
   StepReport step(double duration, double& first);
   /// Box of the surface of a part during the last step, see Part::surfaceBox().
   const BoundingBox& sweptBox(std::size_t part) const { return swept_[part]; }
-  /// Of the barrier [N]; part of the state. 0: not chosen yet.
-  double stiffness() const { return stiffness_; }
-  void setStiffness(double stiffness);
+  /// Of the barrier about a part [N]; part of the state. 0: not chosen yet.
+  double stiffness(std::size_t part) const { return stiffness_[part]; }
+  void setStiffness(std::size_t part, double stiffness) { stiffness_[part] = stiffness; }
+  /// Gives contact the stiffness of all parts. It is no softer than `least` [N] about parts whose surfaces change.
+  void loadStiffness(double least);
   /// Springs of friction of what sticks, see ContactPotential::springs(); part of the state.
   std::vector<FrictionSpring> springs;
 
@@ -67,11 +69,13 @@ private:
   std::vector<Part*> parts_;
   std::vector<BoundingBox> swept_;   ///< per part
   SubstepPotential* attraction_ = nullptr;
-  ContactSurface surface_;       ///< of the parts, without solids
-  std::vector<long> versions_;   ///< of the parts' surfaces
+  ContactSurface surface_;          ///< of the parts, without solids
+  std::vector<long> versions_;      ///< of the parts' surfaces
+  std::vector<int> object_;         ///< of the surface, per part; -1: the part has none
+  std::vector<double> stiffness_;   ///< per part
   bool surface_changes_ = false;
   StepPlan plan_;
-  double duration_ = 0.0, first_stiffness_ = 0.0, stiffness_ = 0.0, gap_ = 0.0;
+  double duration_ = 0.0, gap_ = 0.0;
   bool conserving_ = false;    ///< the present step may not add to the energy
   double most_energy_ = 0.0;   ///< of a step that conserves [J]
   std::size_t failed_ = 0;     ///< part that the last failure is about

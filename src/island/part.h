@@ -17,13 +17,6 @@
 
 namespace slender {
 
-/// The range in which a part wants the stiffness of the barrier [N]. The island takes the largest `least` and the
-/// largest `most` of its parts.
-struct BarrierRange
-{
-  double least = 0.0, most = std::numeric_limits<double>::infinity();
-};
-
 /// What Equations writes into a part.
 struct PartInIsland
 {
@@ -166,7 +159,7 @@ public:
   virtual long surfaceVersion() const { return 0; }
   /// Whether the surface consists of other pieces in each substep, which something else than motion may bring together.
   virtual bool surfaceChanges() const { return false; }
-  /// `gap`: at which surfaces repel [m].
+  /// The range in which the part wants the stiffness of the barrier about it. `gap`: at which surfaces repel [m].
   virtual BarrierRange barrierRange(double) const { return {}; }
 
   /// Box that the surface fills now, or would fill `ahead` seconds later without forces, radii included [m].

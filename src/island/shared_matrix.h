@@ -31,7 +31,7 @@ public:
   struct Columns
   {
     int count = 0;
-    static constexpr int kMost = 36;   // three for each component of four carried points
+    static constexpr int kMost = 54;   // three for each component of three carried points, and as many of a solid
     std::array<int, kMost> index;
     std::array<double, kMost> value;
     void push(int i, double v)

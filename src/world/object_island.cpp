@@ -171,22 +171,30 @@ void ObjectIsland::setParts()
   island_.setParts(parts_);
 }
 
+/// Calls f(object, number of the part) for all parts of the objects.
+template <class F>
+void ObjectIsland::forParts(F&& f) const
+{
+  for (std::size_t k = 0, part = 0; k < objects_.size(); ++k)
+    for (; part < parts_end_[k]; ++part)
+      f(*objects_[k], part);
+}
+
 void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
 {
   stepped_ = false;
   setCarriers();
   setSolids(state, inputs);
-  double stiffness = 0.0;
-  if (contact())
-    for (const WorldObject* object : objects_)
-      stiffness = std::max(stiffness, object->contact(state).stiffness);
-  island_.setStiffness(stiffness);
+  if (!threads_.empty())
+    setParts();
+  if (!contact())
+    return;
+  forParts([&](const WorldObject& object, std::size_t part) {
+    island_.setStiffness(part, object.contact(state).stiffness);
+  });
   takeRanges(state);
   takeSprings(state);
-  if (threads_.empty())
-    return;
-  setParts();
-  if (contact())
+  if (!threads_.empty())
     setStrands();
 }
 
@@ -334,7 +342,11 @@ void ObjectIsland::end(WorldState& state) const
   if (!contact())
     return;
   for (const WorldObject* object : objects_)
-    object->contact(state).stiffness = island_.stiffness();
+    object->contact(state).stiffness = 0.0;
+  forParts([&](const WorldObject& object, std::size_t part) {
+    double& stiffness = object.contact(state).stiffness;
+    stiffness = std::max(stiffness, island_.stiffness(part));
+  });
   giveSprings(state);
 }
 

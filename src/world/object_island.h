@@ -55,6 +55,8 @@ private:
   void takeSprings(WorldState& state);
   void giveSprings(WorldState& state) const;
   bool isDivisible() const;
+  template <class F>
+  void forParts(F&& f) const;
   void trace();
 
   const WorldModel& world_;

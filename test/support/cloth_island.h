@@ -112,12 +112,10 @@ public:
       cloth.inputs.gravity = gravity;
       cloth.part->begin(cloth.state, cloth.inputs, step_);
     }
-    stepper_.setStiffness(stiffness_);
     double first = 0.0;
     const StepReport report = stepper_.step(step_, first);
     if (!report.ok)
       return report;
-    stiffness_ = stepper_.stiffness();
     for (Body& body : bodies)
       body.state = body.part->state();
     for (Rod& rod : rods)
@@ -202,7 +200,7 @@ private:
     stepper_.setContact(solids(), options_);
   }
 
-  double step_, stiffness_ = 0.0;
+  double step_;
   bool begun_ = false;
   ContactOptions options_;
   Island stepper_;

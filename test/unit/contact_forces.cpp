@@ -152,6 +152,48 @@ TEST(ContactForces, StiffnessIsTheDerivativeOfTheForce)
   }
 }
 
+/// A triangle lies on the face of a box, which turns. The second derivative contains that the place of contact runs
+/// along the triangle. It leaves out that the normal turns, so that only the normal components can be compared.
+TEST(ContactForces, StiffnessContainsTheTurnOfASolid)
+{
+  ContactSurface surface;
+  Eigen::Matrix3Xd x(3, 0), corners(3, 3);
+  corners << -0.01, 0.02, 0.0, -0.01, 0.0, 0.02, 0.0, 0.0, 0.0;
+  addSheet(surface, x, corners, Eigen::Vector3i(0, 1, 2), 2e-3, 0.0);
+  surface.solids.push_back({Box{{0.1, 0.1, 0.1}}, -1.0, {}});
+  surface.solids[0].body = true;
+  const Pose rest{{0.003, -0.002, -0.0515}, fromRotationVector({2e-3, -1e-3, 0.3})};
+  ContactPotential potential(surface, gapOptions());
+  potential.setStiffness(1.0);
+  for (const Eigen::Vector3d& turn : {Eigen::Vector3d(1e-7, 0, 0), Eigen::Vector3d(0, 1e-7, 0)})
+  {
+    potential.evaluate(x, {rest}, true);
+    ASSERT_FALSE(potential.rows().empty());
+    Eigen::Vector3d predicted(0, 0, 0), along_normals = predicted;
+    const Eigen::Vector3d normal = potential.rows()[0].normal;
+    for (const ContactTerm& term : potential.terms())
+      for (int i = 0; i < 3; ++i)
+        predicted[term.point[i]] -=
+            term.weight[i] * normal.dot(term.stiffness * turn.cross(term.position - rest.position));
+    for (const ContactRow& row : potential.rows())
+    {
+      ASSERT_EQ(row.solid, 0);
+      double gained = 0.0;   // of the gap, over the row
+      for (int i = 0; i < 3; ++i)
+        gained -= row.along[i] * row.normal.dot(turn.cross(x.col(row.point[i]) - rest.position));
+      for (int i = 0; i < 3; ++i)
+        along_normals[row.point[i]] += row.stiffness * row.along[i] * gained;
+    }
+    potential.evaluate(x, {moved(rest, Eigen::Vector3d::Zero(), turn)}, false);
+    Eigen::Vector3d change = normal.transpose() * gradient(potential, 3);
+    potential.evaluate(x, {moved(rest, Eigen::Vector3d::Zero(), -turn)}, false);
+    change = 0.5 * (change - Eigen::Vector3d(normal.transpose() * gradient(potential, 3)));
+    // rows of less than a thousandth of a pair's stiffness are left out
+    EXPECT_LT((predicted + along_normals - change).norm(), 1e-3 * change.norm());
+    EXPECT_GT((predicted - change).norm(), 0.1 * change.norm());   // the rows matter
+  }
+}
+
 /// Newton's method with these terms and a strict line search: a rod pressed on another by weights. Both are held as in
 /// an implicit step, by springs that alone would let the upper one sink 3 cm, and resist changes of their edges'
 /// vectors.
@@ -286,9 +328,9 @@ TEST(ContactFriction, SpringsLastFromStepToStep)
   EXPECT_NEAR(potential.springs()[0].tension.dot(side), most, 1e-9 * most);
   forceAfter(-1.5 * full);   // and back
   EXPECT_NEAR(potential.springs()[0].tension.dot(side), -0.75 * most, 1e-6 * most);
-  potential.setStiffness(2.0 * potential.stiffness());   // twice the normal force
+  potential.setStiffness(2.0 * potential.stiffness(0));   // twice the normal force
   EXPECT_NEAR(forceAfter(0.0).norm(), 0.75 * most, 1e-6 * most);
-  potential.setStiffness(0.1 * potential.stiffness());   // a fifth of it
+  potential.setStiffness(0.1 * potential.stiffness(0));   // a fifth of it
   EXPECT_NEAR(forceAfter(0.0).norm(), 0.2 * most, 1e-6 * most);
 
   const Pose turned{Eigen::Vector3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()))};

@@ -114,6 +114,35 @@ TEST(IslandScheduler, WhatIsFarApartMovesAsOnItsOwn)
   EXPECT_NEAR(together.state().bodies[0].X_WB.position.z(), -0.3 * 0.05 - 9.81 * 0.05 * 0.051 / 2, 1e-12);
 }
 
+/// A light rope lies across a floor. The box around it contains a heavy body, which is then in its island, and which
+/// does not touch the rope.
+TEST(IslandScheduler, BystandersDoNotStiffenTheBarrier)
+{
+  const std::string rope = R"(
+time: {step: 0.005, duration: 1, integrator: implicit_euler}
+contact: {gap: 0.001}
+rods:
+  - name: rope
+    centerline: {straight: {from: [-0.1, -0.1, 0.0045], to: [0.1, 0.1, 0.0045], edges: 20}}
+    cross_section: {radius: 0.004}
+    material: {density: 100, youngs_modulus: 1.0e5, poissons_ratio: 0.4}
+    contact: {friction: 0.3}
+obstacles:
+  - {name: floor, shape: {plane: {}}}
+)";
+  Simulation alone(parseScene(rope));
+  Simulation beside(parseScene(rope + "bodies: [{name: weight, mass: 20, shape: {box: {size: [0.04, 0.04, 0.04]}}, "
+                                      "pose: {position: [0.06, -0.06, 0.0203]}}]\n"));
+  for (int k = 0; k < 60; ++k)
+  {
+    ASSERT_TRUE(alone.step(alone.defaultInputs()).ok);
+    ASSERT_TRUE(beside.step(beside.defaultInputs()).ok);
+  }
+  EXPECT_GT(beside.state().contact.bodies[0].stiffness, 100.0 * beside.state().contact.rods[0].stiffness);
+  const double apart = (beside.state().rods[0].x - alone.state().rods[0].x).cwiseAbs().maxCoeff();
+  EXPECT_LT(apart, 1e-6 * 0.001);   // of the gap; tolerances of Newton's method are of the island
+}
+
 /// A rod without contact and a body without a shape, welded together, keep their integrator beside a thread that
 /// touches.
 TEST(IslandScheduler, ThreadsLeaveTheIntegratorToWhatTheyCannotMeet)

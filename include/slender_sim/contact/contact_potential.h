@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -75,6 +76,7 @@ struct ContactSolid : Obstacle
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
   int number = -1;              ///< IgnoredSolid refers to this number; -1: no object ignores the solid
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
+  double least_stiffness = 0;   ///< of the barrier about it [N], see ContactPotential::stiffness()
   /// Numbers of objects, in ascending order, and shares of the gap in (0, 1]. The solid repels such an object only
   /// within this share, so that a pair that starts closer together than the gap exerts no force at first.
   std::vector<std::pair<int, double>> ranges{};
@@ -97,6 +99,12 @@ struct ContactOptions
   double slip_speed = 1e-4;
   /// [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
   double least_stiffness = 1e-6;
+};
+
+/// The range of the stiffness of an object's barrier [N].
+struct BarrierRange
+{
+  double least = 0.0, most = std::numeric_limits<double>::infinity();
 };
 
 /// Whether two segments of one curve are neighbours, which never count as a pair: their rest distance along the curve,
@@ -140,10 +148,12 @@ struct ContactTerm
 
 /// What a pair's second derivative contains besides, because the place of contact runs along the pieces: stiffness r
 /// r^T over the points, with r_i = along[i] normal + across[i] turning. Without `turning` the parts that make up for
-/// `geometric` are left out.
+/// `geometric` are left out. If a solid is touched, points count by their displacement against the solid's material
+/// that is there, so that r contains the turn of the solid.
 struct ContactRow
 {
   int point[4] = {-1, -1, -1, -1};
+  int solid = -1;   ///< that is touched, -1: none
   double along[4] = {0, 0, 0, 0}, across[4] = {0, 0, 0, 0};
   Eigen::Vector3d normal{0, 0, 0}, turning{0, 0, 0};
   double stiffness = 0.0;
@@ -230,26 +240,31 @@ public:
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const;
   const std::vector<ContactRow>& rows() const;
+  /// Changes the normal forces of terms(), which evaluate() has filled with their stiffness, to what they would become
+  /// if the solids that move as prescribed went on to these poses, to first order. Only forces that grow change.
+  void pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
 
   /// Largest normal force [N] and smallest softened gap [m] of the last evaluate(); 0 and infinity without contact.
   double largestForce() const;
   double smallestGap() const;
 
-  /// Force [N] of the barrier at half the gap. adaptStiffness(), after a step, follows the largest normal force of the
-  /// last evaluate(): it aims at a smallest gap of a fifth and acts outside a twelfth to a half. It makes the barrier
-  /// stiffer only where stiffen() would. Part of a simulation's state.
-  double stiffness() const;
-  void setStiffness(double force);
+  /// Force [N] of the barrier about an object at half the gap. The barrier between two objects has the larger stiffness
+  /// of the two, and that between an object and a solid is no softer than ContactSolid::least_stiffness.
+  /// adaptStiffness(), after a step, follows the largest normal force on each object in the last evaluate(): it aims at
+  /// a smallest gap of a fifth and acts outside a twelfth to a half. It makes the barrier stiffer only where stiffen()
+  /// would. Part of a simulation's state.
+  double stiffness(int object) const;
+  /// The range holds until the next call. It begins no lower than ContactOptions::least_stiffness. `force`: 0 for the
+  /// least of the range.
+  void setStiffness(int object, double force, const BarrierRange& range = {});
+  void setStiffness(double force);   ///< of all objects
   void adaptStiffness();
   /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. If a gap has
-  /// shrunk below a twelfth of the gap since begin(), or is below a fiftieth, the barrier is made stiffer: as
-  /// adaptStiffness() would where a solution has `converged`, fourfold where forces mean nothing yet. Gaps of what lies
-  /// in a narrow place do not open then: the next call takes the stiffness back, and it stays what it was until
-  /// begin(). Returns whether it has changed.
+  /// shrunk below a twelfth of the gap since begin(), or is below a fiftieth, the barriers of what touches there are
+  /// made stiffer: as adaptStiffness() would where a solution has `converged`, fourfold where forces mean nothing yet.
+  /// Gaps of what lies in a narrow place do not open then: the next call takes the stiffness back, and it stays what it
+  /// was until begin(). Returns whether a barrier has changed.
   bool stiffen(bool converged);
-  /// From now on the stiffness stays below this [N]; no less than what it is to be set to. At first there is no such
-  /// bound.
-  void setMostStiffness(double force);
 
 private:
   class Impl;

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <limits>
+
+#include "slender_sim/contact/barrier.h"
+#include "slender_sim/contact/contact_potential.h"
+
+namespace slender {
+
+/// The stiffness of the barrier about one object [N], which follows the forces on this object. What touches other
+/// objects of the island does not change it.
+class BarrierStiffness
+{
+public:
+  double value() const { return value_; }
+  /// The range holds until the next call.
+  void set(double force, const BarrierRange& range);
+
+  // ---- the contacts of an evaluation
+  void restart();
+  /// A contact of the object: the normal force [N], the stiffness of its barrier [N], and the gap over the one at which
+  /// the pair repels.
+  void take(double force, double stiffness, double share);
+
+  void beginStep();   ///< The last evaluation was where a step begins.
+  /// See ContactPotential::adaptStiffness() and stiffen().
+  void adapt(const Barrier& barrier);
+  bool stiffen(const Barrier& barrier, bool converged);
+
+private:
+  bool shrinks() const;
+  void bound();
+
+  double value_ = 0.0;
+  BarrierRange range_;
+  double largest_force_ = 0.0;                                      ///< of the last evaluation [N]
+  double largest_load_ = 0.0;                                       ///< force over the stiffness of its barrier
+  double share_ = std::numeric_limits<double>::infinity();          ///< smallest gap over that which repels
+  double stiffness_there_ = 0.0;                                    ///< of the barrier of this smallest gap
+  double share_begin_ = std::numeric_limits<double>::infinity();    ///< share_ at beginStep()
+  double share_before_ = std::numeric_limits<double>::infinity();   ///< share_ before the barrier was made stiffer
+  double value_before_ = 0.0;                                       ///< its stiffness until then
+  bool stiffened_ = false, narrow_ = false;   ///< in this step; narrow: a stiffer barrier has opened no gap
+};
+
+}   // namespace slender
