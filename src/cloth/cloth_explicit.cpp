@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "cloth_stepper_impl.h"
+#include "cloth_stages.h"
 
 namespace slender {
 
@@ -21,7 +21,7 @@ double largest(int n, const PointVector& d)
 }   // namespace
 
 /// The matrix of imex steps, with the bending of the system.
-void ClothStepper::Impl::useConstantMatrix()
+void ClothStages::useConstantMatrix()
 {
   if (options.integrator != Integrator::imex)
     return;
@@ -32,7 +32,7 @@ void ClothStepper::Impl::useConstantMatrix()
 }
 
 /// h^2 w^2 + 2 b h w^2 < 4 with viscous forces from the strains one step ago, b the damping by stiffness.
-double ClothStepper::Impl::stableStep() const
+double ClothStages::stableStep() const
 {
   constexpr int kIterations = 60;
   if (!isExplicit())
@@ -77,76 +77,73 @@ double ClothStepper::Impl::stableStep() const
   return 4.0 / square / (b + std::sqrt(b * b + 4.0 / square));
 }
 
-/// Symplectic Euler: velocities by the forces at the start, then positions. Viscous forces from the strains one step
-/// ago.
-StepFailure ClothStepper::Impl::explicitStep(double from, double to, StepReport& report)
+StepFailure ClothStages::stepExplicitly(double from, double to, StepReport& report)
 {
+  if (workExceeded())
+    return StepFailure::work_exceeded;
   const double h = to - from;
-  const int n = model->vertices();
   toPoints(work_.x, x);
   toPoints(work_.v, v_);
   next_ = work_;
-  system->usePlasticState(work_);
-  if (model->stiffness_damping > 0)
+  system->hold(work_);
+  if (model->stiffness_damping > 0)   // viscous forces from the strains one step ago
   {
     for (std::size_t i = 0; i < x.size(); ++i)
       trial_[i] = x[i] - h * v_[i];
     system->setViscosity(model->stiffness_damping / h, trial_);
   }
-  const ClothEvaluation here = addForces(true);
+  const ClothEvaluation here = addForces(!constant_);
+  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
+  if (!constant_)
+    moveByMasses(h, to / duration_);
+  else if (!moveByMatrix(h, to / duration_, report))
+    return StepFailure::singular_matrix;
+  report.max_strain = std::max(report.max_strain, here.max_strain);
+  const bool slow = next_.v.cwiseAbs().maxCoeff() < 1e8;
+  return std::isfinite(here.energy()) && next_.x.allFinite() && slow ? StepFailure::none
+                                                                     : StepFailure::state_not_finite;
+}
+
+/// Symplectic Euler: velocities by the forces at the start, then positions. Pins are at this fraction of the step.
+void ClothStages::moveByMasses(double h, double fraction)
+{
+  const int n = model->vertices();
   for (int i = 0; i < n; ++i)
   {
     point(force_, i) -= model->mass[i] * model->mass_damping * point(v_, i);
     point(v_, i) += h / model->mass[i] * point(force_, i);
   }
-  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
   {
     const int p = work_.pins[k];
-    const Eigen::Vector3d v = (pinAt(k, to / duration_) - work_.x.col(p)) / h;
+    const Eigen::Vector3d v = (pinAt(k, fraction) - work_.x.col(p)) / h;
     pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, p) - model->mass[p] * (v - work_.v.col(p)) / h;
     point(v_, p) = v;
   }
-  double fastest = 0.0;
   for (int i = 0; i < n; ++i)
   {
     next_.v.col(i) = point(v_, i);
     next_.x.col(i) += h * point(v_, i);
-    fastest = std::max(fastest, next_.v.col(i).cwiseAbs().maxCoeff());
   }
-  report.max_strain = std::max(report.max_strain, here.max_strain);
-  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none
-                                                                              : StepFailure::state_not_finite;
 }
 
 /// (M (1/h^2 + a/h) + (1 + b/h) K) d = M v/h + f - K x for the motion d of the step, with a and b of the damping, K of
-/// the bending, and f the membrane's forces (elastic and viscous) and the wind at the start, and the loads.
-StepFailure ClothStepper::Impl::imexStep(double from, double to, StepReport& report)
+/// the bending, and f the membrane's forces (elastic and viscous) and the wind at the start, and the loads. Returns
+/// false if the matrix is singular.
+bool ClothStages::moveByMatrix(double h, double fraction, StepReport& report)
 {
-  const double h = to - from, viscous = 1.0 + model->stiffness_damping / h;
   const int n = model->vertices();
-  toPoints(work_.x, x);
-  toPoints(work_.v, v_);
-  next_ = work_;
-  system->hold(work_);
   if (h != constant_h_ || system->held() != constant_held_)
   {
     for (int i = 0; i < n; ++i)
       constant_weight_[i] = model->mass[i] * (1.0 / (h * h) + model->mass_damping / h);
     constant_h_ = 0.0;
     ++report.factorizations;
-    if (!constant_->factor(constant_weight_, viscous, system->held()))
-      return StepFailure::singular_matrix;
+    if (!constant_->factor(constant_weight_, 1.0 + model->stiffness_damping / h, system->held()))
+      return false;
     constant_h_ = h;
     constant_held_ = system->held();
   }
-  if (model->stiffness_damping > 0)
-  {
-    for (std::size_t i = 0; i < x.size(); ++i)
-      trial_[i] = x[i] - h * v_[i];
-    system->setViscosity(model->stiffness_damping / h, trial_);
-  }
-  const ClothEvaluation here = addForces(false);
   std::fill(trial_.begin(), trial_.end(), 0.0);
   if (const PointMatrix* constant = system->constantMatrix())
     constant->addProduct(-1.0, x.data(), trial_.data());
@@ -154,7 +151,7 @@ StepFailure ClothStepper::Impl::imexStep(double from, double to, StepReport& rep
   for (int i = 0; i < n; ++i)
     point(force_, i) += point(trial_, i) + model->mass[i] / h * point(v_, i);
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
-    point(d_, work_.pins[k]) = pinAt(k, to / duration_) - work_.x.col(work_.pins[k]);
+    point(d_, work_.pins[k]) = pinAt(k, fraction) - work_.x.col(work_.pins[k]);
   // what is held moves as given
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());
@@ -164,21 +161,18 @@ StepFailure ClothStepper::Impl::imexStep(double from, double to, StepReport& rep
   constant_->solve(trial_, d_);
   std::fill(trial_.begin(), trial_.end(), 0.0);
   constant_->addProduct(d_.data(), trial_.data());
-  pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
-  for (std::size_t k = 0; k < work_.pins.size(); ++k)
-    pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, work_.pins[k]) - point(trial_, work_.pins[k]);
-  double fastest = 0.0;
   for (int i = 0; i < n; ++i)
   {
     next_.v.col(i) = point(d_, i) / h;
     next_.x.col(i) += point(d_, i);
-    fastest = std::max(fastest, next_.v.col(i).cwiseAbs().maxCoeff());
   }
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
-    next_.x.col(work_.pins[k]) = pinAt(k, to / duration_);
-  report.max_strain = std::max(report.max_strain, here.max_strain);
-  return std::isfinite(here.energy()) && next_.x.allFinite() && fastest < 1e8 ? StepFailure::none
-                                                                              : StepFailure::state_not_finite;
+  {
+    const int p = work_.pins[k];
+    pin_forces.col(static_cast<Eigen::Index>(k)) = point(force_, p) - point(trial_, p);
+    next_.x.col(p) = pinAt(k, fraction);
+  }
+  return true;
 }
 
 }   // namespace slender

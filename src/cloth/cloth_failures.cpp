@@ -69,6 +69,9 @@ StepReport ClothStages::refuse(StepReport& report, StepFailure failure, const st
 std::string ClothStages::explain(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + milliseconds(length);
+  if (isExplicit())
+    return "the explicit step blew up" + at + ": use a shorter step (stable below " + milliseconds(stableStep()) +
+           " at rest) or implicit_euler";
   if (failure == StepFailure::singular_matrix && averages && !averages->independent())
     return kDependentAverages;
   if (failure == StepFailure::singular_matrix)

@@ -44,7 +44,13 @@ ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions
   allocate();
 }
 
-ClothPart::ClothPart(ClothStages& stages) : stages_(stages), linearized_(stages.options.one_newton_step) { allocate(); }
+ClothPart::ClothPart(ClothStages& stages)
+  : stages_(stages),
+    linearized_(stages.options.one_newton_step && !stages.isExplicit())
+{
+  if (!stages.isExplicit())
+    allocate();
+}
 
 void ClothPart::allocate()
 {

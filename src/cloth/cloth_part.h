@@ -27,8 +27,8 @@ public:
   /// for a model or options that are not valid. The island minimises wholly, whether the options ask for one Newton
   /// step or not. A cloth with prescribed averages is always coupled, because its own solvers know no averages.
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
-  /// A cloth that is alone in its island. It takes all implicit integrators of cloth, bounds of the forces of averages,
-  /// and `one_newton_step` of the options. The stages must outlive the part. The owner of the stages starts the budget
+  /// A cloth that is alone in its island. It takes all integrators of cloth, bounds of the forces of averages, and
+  /// `one_newton_step` of the options. The stages must outlive the part. The owner of the stages starts the budget
   /// of work of each step.
   explicit ClothPart(ClothStages& stages);
 
@@ -56,6 +56,10 @@ public:
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport& report) override;
   StepFailure finishSubstep(StepReport&) override;
+  StepFailure predict(const Substep& substep, StepReport& report) override
+  {
+    return stages_.stepExplicitly(substep.from, substep.to, report);
+  }
   void acceptSubstep(const Substep&) override { stages_.commitStep(); }
   Largest unbalancedForce() const override;
   void refuse(StepFailure failure, double length, StepReport& report) const override;

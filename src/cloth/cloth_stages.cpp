@@ -82,6 +82,7 @@ void ClothStages::buildSystem(const ClothModel& of)
     averages = averaged.get();
     linear = std::move(averaged);
   }
+  useConstantMatrix();
 }
 
 void ClothStages::useBudget(std::shared_ptr<WorkBudget> budget)

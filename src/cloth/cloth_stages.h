@@ -20,10 +20,12 @@ inline constexpr char kDependentAverages[] =
     "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the "
     "averages there";
 
-/// A step of one cloth in implicit stages, whose equations an island solves, see ClothPart.
+/// A step of one cloth, which an island advances, see ClothPart: in explicit substeps, or in implicit stages whose
+/// equations the island solves.
 ///
 /// A step is begin(), substeps, end(). A substep is beginStep(); for each stage beginStage(), the solution of its
-/// equations in `x`, and endStage(), after the last one takeEnd() instead; then commitStep(), or the next attempt.
+/// equations in `x`, and endStage(), after the last one takeEnd() instead; then commitStep(), or the next attempt. An
+/// explicit substep is stepExplicitly() and commitStep().
 class ClothStages
 {
 public:
@@ -76,6 +78,11 @@ public:
   /// `internal`: the largest force that closeGradient() returned, or of contact [N].
   ClothBalance takeEnd(double internal, double max_strain, StepReport& report);
   void commitStep() { std::swap(work_, next_); }
+  /// An explicit substep between these times, counted from the start of the step [s].
+  StepFailure stepExplicitly(double from, double to, StepReport& report);
+  /// Longest stable explicit step of the cloth at rest [s]; infinite for implicit integrators.
+  double stableStep() const;
+  bool isExplicit() const { return slender::isExplicit(options.integrator); }
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity);
 
@@ -108,13 +115,7 @@ public:
 protected:
   /// Is called when the system is of another model, see followClamps().
   virtual void systemChanged() {}
-  /// Says why steps of a length fail so, and what to change.
-  virtual std::string explain(StepFailure failure, double length) const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;
-  bool isExplicit() const
-  {
-    return options.integrator == Integrator::symplectic_euler || options.integrator == Integrator::imex;
-  }
   /// Forces at (x, v_) without mass damping into force_.
   ClothEvaluation addForces(bool with_constant);
   ClothEvaluation acceleration(double delta);
@@ -142,6 +143,11 @@ protected:
   double average_work_ = 0, pin_work_ = 0;
 
 private:
+  std::string explain(StepFailure failure, double length) const;
+  void useConstantMatrix();
+  void moveByMasses(double h, double fraction);
+  bool moveByMatrix(double h, double fraction, StepReport& report);
+
   const bool with_averages_;
   void buildSystem(const ClothModel& of);
   bool inputsFine(const ClothState& state, const ClothInputs& inputs, double duration, std::string& what) const;
@@ -152,6 +158,10 @@ private:
   bool clamps_known_ = false;
   Eigen::Matrix3Xd pins_start_, averages_start_, wind_v_;
   PointVector v_start_, a_start_, x_stage_, v_stage_, q_hat_, q_tilde_;
+  std::unique_ptr<ShiftedMatrix> constant_;   ///< imex only
+  double constant_h_ = 0;
+  std::vector<char> constant_held_;
+  std::vector<double> constant_weight_;
 };
 
 }   // namespace slender

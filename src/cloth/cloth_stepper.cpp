@@ -1,15 +1,13 @@
 #include "slender_sim/cloth/cloth_stepper.h"
 
 #include "cloth_stepper_impl.h"
-#include "slender_sim/linalg/interruption.h"
 
 namespace slender {
 
-ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o) : ClothStages(std::move(m), o)
+ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
+  : ClothStages(std::move(m), o),
+    part_(*this)
 {
-  useConstantMatrix();
-  if (!isExplicit())
-    part_ = std::make_unique<ClothPart>(*this);
 }
 
 /// The island of the cloth alone that steps as the options say now.
@@ -27,7 +25,7 @@ Island& ClothStepper::Impl::island()
     time.newton.one_step = options.one_newton_step;
     island = std::make_unique<Island>(time, false);
     island->equations().tolerances.most_unbalanced = kUnbalanced;
-    island->setParts({part_.get()});
+    island->setParts({&part_});
   }
   return *island;
 }
@@ -40,59 +38,14 @@ StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs
   if (!accepts(state, inputs, duration, report))
     return report;
   double next = state.next_step;
-  if (isExplicit())
-  {
-    begin(state, inputs, duration);
-    SubstepRule rule;
-    rule.longest = duration;
-    rule.max_cuts = options.newton.max_cuts;
-    SubstepController controller(rule);
-    controller.run(*this, duration, report);
-    next = controller.nextLength();
-  }
-  else
-  {
-    part_->begin(state, inputs, duration);
-    report = island().step(duration, next);
-  }
+  part_.begin(state, inputs, duration);
+  report = island().step(duration, next);
   if (!report.ok)
     return report;
   report.work = ownWork();
   work_.next_step = next;
   end(state);
   return report;
-}
-
-StepFailure ClothStepper::Impl::attempt(const Substep& substep, StepReport& report)
-{
-  if (budget_->spent())
-    return StepFailure::work_exceeded;
-  return options.integrator == Integrator::imex ? imexStep(substep.from, substep.to, report)
-                                                : explicitStep(substep.from, substep.to, report);
-}
-
-bool ClothStepper::Impl::shorterMayHelp(StepFailure) const { return false; }
-
-void ClothStepper::Impl::refuse(const Substep& substep, StepFailure failure, StepReport& report)
-{
-  if (failure == StepFailure::interrupted)
-    refuse(report, failure, kStepInterrupted);
-  else
-    refuseUnsolved(report, budget_->spent() ? StepFailure::work_exceeded : failure, substep.length);
-}
-
-std::string ClothStepper::Impl::explain(StepFailure failure, double length) const
-{
-  if (!isExplicit())
-    return ClothStages::explain(failure, length);
-  return "the explicit step blew up at a step of " + milliseconds(length) + ": use a shorter step (stable below " +
-         milliseconds(stableStep()) + " at rest) or implicit_euler";
-}
-
-void ClothStepper::Impl::systemChanged()
-{
-  statics_.reset();
-  useConstantMatrix();
 }
 
 ClothStepper::ClothStepper(std::shared_ptr<const ClothModel> model, const ClothOptions& options)

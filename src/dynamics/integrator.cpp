@@ -134,12 +134,11 @@ double errorConstant(Integrator integrator)
   }
 }
 
-int order(Integrator integrator)
+bool isExplicit(Integrator integrator)
 {
-  return integrator == Integrator::implicit_euler || integrator == Integrator::symplectic_euler ||
-                 integrator == Integrator::imex
-             ? 1
-             : 2;
+  return integrator == Integrator::symplectic_euler || integrator == Integrator::imex;
 }
+
+int order(Integrator integrator) { return integrator == Integrator::implicit_euler || isExplicit(integrator) ? 1 : 2; }
 
 }   // namespace slender

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "slender_sim/linalg/interruption.h"
 
@@ -17,6 +18,14 @@ void Island::setParts(const std::vector<Part*>& parts)
   stiffness_.resize(parts_.size());
   surface_changes_ = std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->surfaceChanges(); });
   equations_.setParts(parts_);
+  if (!isExplicit(time_.integrator))
+    return;
+  inextensible_.clear();
+  projection_ = std::make_unique<FastProjection>();
+  std::copy_if(parts_.begin(), parts_.end(), std::back_inserter(inextensible_),
+               [this](Part* part) { return part->addTo(*projection_); });
+  if (inextensible_.empty())
+    projection_.reset();
 }
 
 void Island::takeSurface()
@@ -93,7 +102,7 @@ StepReport Island::step(double duration, double& first)
   most_energy_ += allowance;
   SubstepRule rule;
   rule.longest = evenSubstep(duration, longest);
-  rule.error_tolerance = surface_changes_ ? 0.0 : time_.error_tolerance;
+  rule.error_tolerance = surface_changes_ || isExplicit(time_.integrator) ? 0.0 : time_.error_tolerance;
   rule.min_step = time_.min_step;
   rule.order = order(time_.integrator);
   rule.max_cuts = time_.newton.max_cuts;
@@ -256,10 +265,44 @@ std::size_t Island::farthestFromBalance() const
   return force.any() ? static_cast<std::size_t>(force.index()) : 0;
 }
 
+/// Restores the lengths of inextensible parts at the end of the substep, or with `at_start` as it begins: before a
+/// run's first step, whatever stretching they come with is taken out without becoming a velocity.
+StepFailure Island::project(double h, bool at_start, StepReport& report)
+{
+  for (Part* part : parts_)
+    part->giveTo(*projection_, at_start);
+  const ProjectionReport result = projection_->project(h);
+  report.projection_iterations = std::max(report.projection_iterations, result.iterations);
+  report.constraint_error = std::max(report.constraint_error, result.constraint_error);
+  if (result.ok && at_start && result.iterations == 0)
+    return StepFailure::none;
+  for (failed_ = 0; failed_ < parts_.size(); ++failed_)
+    if (const StepFailure failure = parts_[failed_]->takeFrom(*projection_, result, at_start);
+        failure != StepFailure::none)
+      return failure;
+  failed_ = 0;
+  return StepFailure::none;
+}
+
+/// Forces at the start, velocities and positions, projection of inextensible parts and of the bodies that carry them.
+StepFailure Island::stepExplicitly(const Substep& substep, StepReport& report)
+{
+  if (std::any_of(inextensible_.begin(), inextensible_.end(),
+                  [](const Part* part) { return part->lastSubstep() == 0.0; }))
+    if (const StepFailure failure = project(substep.length, true, report); failure != StepFailure::none)
+      return failure;
+  for (failed_ = parts_.size(); failed_-- > 0;)   // bodies come last: rods act on them
+    if (const StepFailure failure = parts_[failed_]->predict(substep, report); failure != StepFailure::none)
+      return failure;
+  return projection_ ? project(substep.length, false, report) : StepFailure::none;
+}
+
 StepFailure Island::attempt(const Substep& substep, StepReport& report)
 {
-  if (const StepFailure failure = solveSubstep(substep, report); failure != StepFailure::none)
-    return failure;
+  const StepFailure solved =
+      isExplicit(time_.integrator) ? stepExplicitly(substep, report) : solveSubstep(substep, report);
+  if (solved != StepFailure::none)
+    return solved;
   if (conserving_ && energyAtEnd() > most_energy_)
     return StepFailure::energy_grew;
   if (ContactPotential* contact = equations_.contact())
@@ -289,7 +332,7 @@ void Island::accept(const Substep& substep)
 
 bool Island::shorterMayHelp(StepFailure failure) const
 {
-  return failed_ >= parts_.size() || parts_[failed_]->shorterMayHelp(failure);
+  return !isExplicit(time_.integrator) && (failed_ >= parts_.size() || parts_[failed_]->shorterMayHelp(failure));
 }
 
 bool Island::mend(StepReport& report)

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "island/equations.h"
+#include "slender_sim/dynamics/fast_projection.h"
 #include "slender_sim/dynamics/time_config.h"
 
 namespace slender {
@@ -17,7 +19,8 @@ public:
   virtual double largestForce() const = 0;   ///< that it exerts at the start of the substep [N]
 };
 
-/// Advances the parts of an island together, in substeps common to all.
+/// Advances the parts of an island together, in substeps common to all. An implicit substep minimises their energy. An
+/// explicit one takes the forces at its start, and projects inextensible rods to their lengths.
 class Island : SubstepEquations
 {
 public:
@@ -56,6 +59,8 @@ private:
   bool surfaceIsStale() const;
   NewtonResult solveStage(std::size_t stage, const Substep& substep);
   StepFailure solveSubstep(const Substep& substep, StepReport& report);
+  StepFailure project(double h, bool at_start, StepReport& report);
+  StepFailure stepExplicitly(const Substep& substep, StepReport& report);
   std::size_t farthestFromBalance() const;
 
   StepFailure attempt(const Substep& substep, StepReport& report) override;
@@ -67,7 +72,9 @@ private:
   const TimeConfig time_;
   Equations equations_;
   std::vector<Part*> parts_;
-  std::vector<BoundingBox> swept_;   ///< per part
+  std::vector<BoundingBox> swept_;               ///< per part
+  std::unique_ptr<FastProjection> projection_;   ///< of `inextensible_`; null: there are no such parts
+  std::vector<Part*> inextensible_;              ///< parts whose lengths explicit steps keep
   SubstepPotential* attraction_ = nullptr;
   ContactSurface surface_;          ///< of the parts, without solids
   std::vector<long> versions_;      ///< of the parts' surfaces

@@ -30,6 +30,9 @@ struct PartInIsland
   RodEvaluation evaluation;                    ///< result of the last evaluate()
 };
 
+class FastProjection;
+struct ProjectionReport;
+
 /// The surface points of a part: what it shows to contact. `point` counts from 0 in each part.
 class PartSurface
 {
@@ -177,6 +180,19 @@ public:
   virtual StepFailure finishSubstep(StepReport&) { return StepFailure::none; }
   /// Takes the end of the substep as the present state.
   virtual void acceptSubstep(const Substep& substep) = 0;
+
+  // ---- an explicit substep; finishSubstep() and acceptSubstep() end it as well
+  /// Computes velocities and positions at the end of the substep from the forces at its start, without constraints. A
+  /// part that bodies carry comes before these bodies and leaves its forces for them. A part without it takes no
+  /// explicit steps.
+  virtual StepFailure predict(const Substep&, StepReport&) { return StepFailure::state_not_finite; }
+  /// Adds its chain or its body to the projection. Returns true if it has lengths that the projection has to keep.
+  virtual bool addTo(FastProjection&) { return false; }
+  /// Tells the projection what moves and where: after predict(), or with `at_start` as the substep begins.
+  virtual void giveTo(FastProjection&, bool) {}
+  /// Takes its motion from a projection that succeeded; with `at_start` its positions alone. Of a projection that
+  /// failed, the part that the report speaks of returns the failure.
+  virtual StepFailure takeFrom(FastProjection&, const ProjectionReport&, bool) { return StepFailure::none; }
 
   // ---- energies, for methods that must not add to them
   /// Whether nothing but the method can change the energy of the part in this step.

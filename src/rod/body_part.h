@@ -6,7 +6,9 @@
 #include "linalg/cholesky6.h"
 #include "body_surface.h"
 #include "body_system.h"
+#include "rod_stepper_impl.h"
 #include "slender_sim/contact/contact_properties.h"
+#include "slender_sim/dynamics/fast_projection.h"
 
 namespace slender {
 
@@ -19,8 +21,20 @@ public:
   BodySystem system;
   Eigen::Vector3d gravity{0, 0, 0};   ///< of the present step [m/s^2]
   BodySystem::Vector6 direction = BodySystem::Vector6::Zero();
-  bool welded = false;   ///< carries parts of rods
 
+  /// A grasp of a rod that follows a body; X_BG: its frame in that of the body.
+  struct Carried
+  {
+    const RodStepper::Impl* rod;
+    int grasp;
+    Pose X_BG;
+  };
+  void carry(const Carried& carried) { carried_.push_back(carried); }
+  /// Lets a node of a chain follow the body, at r_B in its axes [m].
+  void weldTo(FastProjection& projection, int chain, int node, const Eigen::Vector3d& r_B) const
+  {
+    projection.weld(chain, node, number_, r_B - centre_);
+  }
   /// v := matrix^-1 v with the matrix of the last evaluate(true), of a body that is not coupled.
   void solveFor(BodySystem::Vector6& v) const { factor_.solveInPlace(v); }
   /// Begins a step from this state; gravity [m/s^2].
@@ -50,7 +64,7 @@ private:
   // ---- as RigidPart
   bool numberUnknowns() override { return true; }   // they never change
   int unknowns() const override { return 6; }
-  bool joined() const override { return welded; }
+  bool joined() const override { return !carried_.empty(); }
 
   void moveAlong(double alpha) override { system.moveAlong(direction, alpha); }
   void accept() override { system.accept(); }
@@ -104,6 +118,18 @@ private:
   double energyAtEnd() const override { return energyOf(next_); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
+  // ---- its explicit steps, body_explicit.cpp
+  StepFailure predict(const Substep& substep, StepReport& report) override;
+  bool addTo(FastProjection& projection) override;
+  void giveTo(FastProjection& projection, bool at_start) override;
+  StepFailure takeFrom(FastProjection& projection, const ProjectionReport& result, bool at_start) override;
+  template <class Do>
+  void forCarried(const Do& apply) const;
+  void compose();
+  void addForces(Eigen::Vector3d& force, Eigen::Vector3d& torque) const;
+  void damp(double h, Eigen::Vector3d& momentum);
+  StepFailure place(const ProjectedBody& whole);
+
   double energyOf(const RigidBodyState& state) const;
   Eigen::Vector3d position(int point) const { return system.pose * Eigen::Vector3d(surface_.points.col(point)); }
   void addOwnContacts(bool with_hessian);
@@ -116,6 +142,11 @@ private:
   BodySurface surface_;
   double friction_ = 0.0;
   int carrier_ = -1;
+  std::vector<Carried> carried_;
+  /// The body together with the nodes that it carries, in an explicit substep. `pose` is its end without constraints.
+  ProjectedBody whole_;
+  Eigen::Vector3d centre_{0, 0, 0};   ///< its centre of mass, body axes [m]
+  int number_ = -1;                   ///< in the projection
   BodySystem::Vector6 start_wrench_, start_acceleration_;
   BodySystem::Matrix6 start_inertia_;
 };

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rod_stepper_impl.h"
+#include "rod_part.h"
 
 namespace slender {
 
@@ -24,10 +24,7 @@ StepFailure RodStepper::Impl::explicitPredict(const RodInputs& inputs, double du
   next = work;
   next.last_step = h;
   for (int i = 0; i < n; ++i)
-  {
-    const Eigen::Vector3d force = load(inputs, i) - (isotropic ? isotropic->nodeGradient(i) : system.nodeGradient(i));
-    next.v.col(i) = model->mass[i] * work.v.col(i) + h * force;
-  }
+    next.v.col(i) = model->mass[i] * work.v.col(i) + h * nodeForce(inputs, i);
   if (model->damped())   // by the velocity at the end of the step: linear, so it costs nothing to treat implicitly
     for (int i = 0; i < n; ++i)
       next.v.col(i) /= model->mass[i] + h * model->damping(i);
@@ -65,21 +62,12 @@ RodEvaluation RodStepper::Impl::evaluateStart(const RodInputs& inputs, double du
 /// What the rod's elasticity and its loads do to the grippers, and to the bodies that carry it, as the substep begins.
 void RodStepper::Impl::elasticWrenches(const RodInputs& inputs)
 {
+  wrenches.assign(wrenches.size(), Wrench());
+  addToWrenches([&](int i) { return nodeForce(inputs, i); }, true);
   for (std::size_t k = 0; k < wrenches.size(); ++k)
-  {
-    Wrench& w = wrenches[k];
-    w = Wrench{};
-    const GraspState& g = work.grasps[k];
-    if (!g.active)
-      continue;
-    for (int i = g.first_node; i <= g.last_node; ++i)
-    {
-      const Eigen::Vector3d force = load(inputs, i) - (isotropic ? isotropic->nodeGradient(i) : system.nodeGradient(i));
-      w.force += force;
-      w.torque += (work.x.col(i) - g.X_WG.position).cross(force);
-    }
-    w.torque += isotropic ? isotropic->clampTorque(static_cast<int>(k)) : system.clampTorque(static_cast<int>(k));
-  }
+    if (work.grasps[k].active)
+      wrenches[k].torque +=
+          isotropic ? isotropic->clampTorque(static_cast<int>(k)) : system.clampTorque(static_cast<int>(k));
 }
 
 /// Positions and velocities of held nodes at an instant; those of grasps that bodies carry follow stage_poses and
@@ -110,21 +98,11 @@ StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double dur
   holdNodes(inputs, duration, t + h);
   if (!next.x.allFinite() || !next.v.allFinite())
     return StepFailure::state_not_finite;
-  for (std::size_t k = 0; k < wrenches.size(); ++k)
-  {
-    // Newton's law of a held node: gripper's force = m a + damping - (internal and external forces); the rod's is the
-    // opposite
-    const GraspState& g = work.grasps[k];
-    if (!g.active || g.body >= 0)
-      continue;
-    for (int i = g.first_node; i <= g.last_node; ++i)
-    {
-      const Eigen::Vector3d force =
-          -model->mass[i] * (next.v.col(i) - work.v.col(i)) / h - model->damping(i) * next.v.col(i);
-      wrenches[k].force += force;
-      wrenches[k].torque += (work.x.col(i) - work.grasps[k].X_WG.position).cross(force);
-    }
-  }
+  // Newton's law of a held node: gripper's force = m a + damping - (internal and external forces); the rod's is the
+  // opposite
+  addToWrenches([&](int i) {
+    return Eigen::Vector3d(-model->mass[i] * (next.v.col(i) - work.v.col(i)) / h - model->damping(i) * next.v.col(i));
+  });
   if (isotropic)
     return isotropic->settle(work, stage_poses, next);
 
@@ -158,22 +136,88 @@ StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double dur
   return StepFailure::none;
 }
 
-/// Projected positions and velocities; wrenches take up the forces of the constraints on held nodes.
-void RodStepper::Impl::takeProjection(const FastProjection& projection, int chain)
+// ---- as a part of an island
+
+StepFailure RodPart::predict(const Substep& substep, StepReport& report)
 {
-  projection.correct(chain, next.x, next.v);
-  for (std::size_t k = 0; k < wrenches.size(); ++k)
+  substep_ = substep;
+  return rod_.explicitPredict(*inputs_, duration_, substep.from, substep.length, report);
+}
+
+bool RodPart::addTo(FastProjection& projection)
+{
+  const RodModel& m = *rod_.model;
+  chain_ = m.inextensible ? projection.addChain(m.rest_length, m.mass, m.closed) : -1;
+  return m.inextensible;
+}
+
+void RodPart::giveTo(FastProjection& projection, bool at_start)
+{
+  if (chain_ < 0)
+    return;
+  if (!numberUnknowns())   // other nodes are held than before
+    projection.releaseAll(chain_);
+  for (std::size_t k = 0; k < rod_.work.grasps.size(); ++k)
   {
-    const GraspState& g = work.grasps[k];
-    if (!g.active || g.body >= 0)
-      continue;
-    for (int i = g.first_node; i <= g.last_node; ++i)
-    {
-      const Eigen::Vector3d force = projection.force(chain, i);
-      wrenches[k].force += force;
-      wrenches[k].torque += (work.x.col(i) - g.X_WG.position).cross(force);
-    }
+    const GraspState& g = rod_.work.grasps[k];
+    const Weld* weld = weldOf(static_cast<int>(k));
+    for (int i = g.first_node; g.active && i <= g.last_node; ++i)
+      if (weld)
+        weld->body->weldTo(projection, chain_, i, weld->X_BG * g.nodes_G[i - g.first_node]);
+      else
+        projection.hold(chain_, i);
   }
+  projection.setStart(chain_, rod_.work.x);
+  projection.setTrial(chain_, at_start ? rod_.work.x : rod_.next.x);
+}
+
+/// Wrenches take up the forces of the constraints on held nodes.
+StepFailure RodPart::takeFrom(FastProjection& projection, const ProjectionReport& result, bool at_start)
+{
+  if (!result.ok)
+  {
+    if (chain_ != std::max(result.chain, 0))
+      return StepFailure::none;
+    rod_.overstretched = {result.chain < 0 ? -1 : result.first_node, result.last_node};
+    return StepFailure::overstretched;
+  }
+  if (at_start)
+    takeStart(projection);
+  else if (chain_ >= 0)
+  {
+    projection.correct(chain_, rod_.next.x, rod_.next.v);
+    rod_.addToWrenches([&](int node) { return projection.force(chain_, node); });
+  }
+  return StepFailure::none;
+}
+
+/// Nodes, and grasps that bodies carry, as the substep begins.
+void RodPart::takeStart(const FastProjection& projection)
+{
+  RodState& now = rod_.work;
+  if (chain_ >= 0)
+  {
+    rod_.next.v.setZero(3, rod_.model->nodes());   // velocities stay
+    projection.correct(chain_, now.x, rod_.next.v);
+  }
+  for (const Weld& weld : welds_)
+  {
+    GraspState& g = now.grasps[weld.grasp];
+    if (!g.active)
+      continue;
+    g.X_WG = rod_.stage_poses[weld.grasp] = weld.body->state().X_WB * weld.X_BG;
+    for (int i = g.first_node; i <= g.last_node; ++i)
+      now.x.col(i) = g.X_WG * g.nodes_G[i - g.first_node];
+  }
+}
+
+/// Implicit substeps end with their last stage.
+StepFailure RodPart::finishSubstep(StepReport&)
+{
+  if (!isExplicit(rod_.time.integrator))
+    return StepFailure::none;
+  takeCarriedMotion();
+  return rod_.explicitFinish(*inputs_, duration_, substep_.from, substep_.length);
 }
 
 }   // namespace slender

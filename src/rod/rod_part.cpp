@@ -8,16 +8,16 @@ namespace slender {
 
 void RodPart::addWeld(const Weld& weld)
 {
-  weld.body->welded = true;
+  weld.body->carry({&rod_, weld.grasp, weld.X_BG});
   welds_.push_back(weld);
 }
 
-/// The body that carries a grasp; null: none does.
-const BodyPart* RodPart::carrier(int grasp) const
+/// Null: no body carries the grasp.
+const RodPart::Weld* RodPart::weldOf(int grasp) const
 {
   for (const Weld& weld : welds_)
     if (weld.grasp == grasp)
-      return weld.body;
+      return &weld;
   return nullptr;
 }
 
@@ -43,7 +43,7 @@ bool RodPart::numberUnknowns()
     holds_.push_back(hold(g));
     if (!g.active)
       continue;
-    const bool carried = carrier(static_cast<int>(k)) != nullptr;
+    const bool carried = weldOf(static_cast<int>(k)) != nullptr;
     const int code = carried ? -2 - static_cast<int>(k) : kPrescribed;
     welded_ = welded_ || carried;
     for (int i = g.first_node; i <= g.last_node; ++i)
@@ -161,7 +161,7 @@ void RodPart::columnsOf(int unknown, double weight, Columns& row) const
     row.push(offset + number, weight);
   if (number >= kPrescribed)
     return;
-  const BodyPart& body = *carrier(-2 - number);
+  const BodyPart& body = *weldOf(-2 - number)->body;
   const int node = unknown / 4, c = unknown % 4;
   const RodArrays& a = system_.arrays();
   if (c < 3)
@@ -195,7 +195,7 @@ void RodPart::notePattern(SharedMatrix& matrix)
         matrix.notePairs(ca, cb);
       }
   for (const ClampJoint& clamp : system().clamps())
-    if (const BodyPart* body = carrier(clamp.grasp))
+    if (const Weld* weld = weldOf(clamp.grasp))
     {
       Columns edge, turn;
       const int next = (clamp.edge + 1) % system_.nodes();
@@ -203,7 +203,7 @@ void RodPart::notePattern(SharedMatrix& matrix)
       {
         columnsOf(4 * clamp.edge + c, 1.0, edge);
         columnsOf(4 * next + c, 1.0, edge);
-        turn.push(body->offset + 3 + c, 1.0);
+        turn.push(weld->body->offset + 3 + c, 1.0);
       }
       columnsOf(4 * clamp.edge + 3, 1.0, edge);
       matrix.notePairs(edge, turn);
@@ -263,8 +263,8 @@ void RodPart::addClamps(SharedMatrix& matrix) const
   const RodArrays& arrays = system_.arrays();
   for (const ClampJoint& c : system().clamps())
   {
-    const BodyPart* body = carrier(c.grasp);
-    if (!body)
+    const Weld* weld = weldOf(c.grasp);
+    if (!weld)
       continue;
     const int j = c.edge, next = (j + 1) % arrays.nodes;
     const Eigen::Vector3d t(arrays.t[0][j], arrays.t[1][j], arrays.t[2][j]), e = t / arrays.inverse_length[j];
@@ -274,7 +274,7 @@ void RodPart::addClamps(SharedMatrix& matrix) const
     const Eigen::Vector3d by_angle = e.cross(c.hessian_et) + c.hessian_tt * t;
     Eigen::Matrix3d turn = skew(c.torque) - by_edge * skew(e) + by_angle * t.transpose();
     turn = (0.5 * (turn + turn.transpose())).eval();
-    const int base = body->offset + 3;
+    const int base = weld->body->offset + 3;
     Columns row, column;
     for (int p = 0; p < 3; ++p)
     {

@@ -75,6 +75,7 @@ private:
   void takeStartAcceleration() override;
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
+  StepFailure finishSubstep(StepReport& report) override;
   void acceptSubstep(const Substep& substep) override;
   bool conserves() const override;
   double energyAtStart(double& allowance) override;
@@ -82,8 +83,15 @@ private:
   Largest unbalancedForce() const override { return rod_.unbalancedForce(); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
+  // ---- its explicit steps, rod_explicit.cpp
+  StepFailure predict(const Substep& substep, StepReport& report) override;
+  bool addTo(FastProjection& projection) override;
+  void giveTo(FastProjection& projection, bool at_start) override;
+  StepFailure takeFrom(FastProjection& projection, const ProjectionReport& result, bool at_start) override;
+  void takeStart(const FastProjection& projection);
+
   const RodSystem& system() const { return rod_.system; }
-  const BodyPart* carrier(int grasp) const;
+  const Weld* weldOf(int grasp) const;
   void columnsOf(int unknown, double weight, Columns& row) const;
   void addCarried(SharedMatrix& matrix) const;
   void addClamps(SharedMatrix& matrix) const;
@@ -102,6 +110,7 @@ private:
   std::vector<Weld> welds_;
   const RodInputs* inputs_ = nullptr;
   double duration_ = 1.0;
+  int chain_ = -1;   ///< its number in the projection; -1: it stretches
   bool welded_ = false;
   bool dependent_ = false;   ///< the prescribed averages depend on each other on the free nodes
   std::vector<std::array<int, 3>> carried_entries_;   ///< node, column, row of those with a carried unknown

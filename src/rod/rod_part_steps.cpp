@@ -171,7 +171,7 @@ void RodPart::refuse(StepFailure failure, double length, StepReport& report) con
     why =
         "what the rod touches or is welded to may not let it have the averages of its guide: keep the guide clear of "
         "that, or let it move by less at once";
-  rod_.refuseUnsolved(report, failure, length, false, why);
+  rod_.refuseUnsolved(report, failure, length, why);
 }
 
 }   // namespace slender

@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "island/island.h"
-#include "explicit_system.h"
 #include "rod_part.h"
 #include "slender_sim/geometry/rotation.h"
 
@@ -17,8 +16,6 @@ class RodStepper::Alone
 public:
   explicit Alone(Impl& rod) : rod_(rod), part_(rod, false), island_(rod.time, false)
   {
-    if (rod.time.integrator == Integrator::symplectic_euler)
-      explicit_ = std::make_unique<ExplicitSystem>(rod.time, std::vector<Impl*>{&rod});
     island_.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
     island_.setParts({&part_});
   }
@@ -26,11 +23,6 @@ public:
   /// From what the rod has loaded.
   StepReport step(const RodInputs& inputs, double duration)
   {
-    if (explicit_)
-    {
-      explicit_->setInputs(0, inputs);
-      return explicit_->step(duration);
-    }
     part_.begin(inputs, duration);
     return island_.step(duration, rod_.work.next_step);
   }
@@ -39,7 +31,6 @@ private:
   Impl& rod_;
   RodPart part_;
   Island island_;
-  std::unique_ptr<ExplicitSystem> explicit_;   ///< null: implicit steps
 };
 
 RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time)
@@ -227,8 +218,9 @@ StepReport RodStepper::Impl::refuse(StepReport& report, StepFailure failure, con
   return report;
 }
 
-std::string RodStepper::Impl::explainFailure(StepFailure failure, double length, bool explicit_step) const
+std::string RodStepper::Impl::explainFailure(StepFailure failure, double length) const
 {
+  const bool explicit_step = isExplicit(time.integrator);
   const std::string at = " at a step of " + milliseconds(length);
   switch (failure)
   {
@@ -277,9 +269,9 @@ Largest RodStepper::Impl::unbalancedForce() const
   return force;
 }
 
-StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step,
-                                            const std::string& why)
+void RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, const std::string& why)
 {
+  const bool explicit_step = isExplicit(time.integrator);
   // explicit steps end in a state that says nothing; that at their start shows what is about to blow up
   Largest strain, node;
   const bool implicit = !explicit_step && system.arrays().nodes == model->nodes();
@@ -304,7 +296,7 @@ StepReport RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure fail
   else
     text += ", whose first node";
   text += " was at " + metres(report.place.position) + " as the step began";
-  return refuse(report, failure, (why.empty() ? explainFailure(failure, length, explicit_step) : why) + text);
+  refuse(report, failure, (why.empty() ? explainFailure(failure, length) : why) + text);
 }
 
 void RodStepper::Impl::placeAt(const RodInputs& inputs, double duration, double fraction)

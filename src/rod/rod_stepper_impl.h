@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "slender_sim/rod/isotropic_rod.h"
-#include "slender_sim/dynamics/fast_projection.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/dynamics/newton.h"
 #include "slender_sim/rod/rod_stepper.h"
@@ -47,9 +46,8 @@ public:
   /// Largest unbalanced force [N] on a free node in the last evaluation of an implicit step.
   Largest unbalancedForce() const;
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the rod was farthest
-  /// from a solution. `why`: takes the place of explainFailure().
-  StepReport refuseUnsolved(StepReport& report, StepFailure failure, double length, bool explicit_step,
-                            const std::string& why = "");
+  /// from a solution. `why`: takes the place of explainFailure(); empty: nothing does.
+  void refuseUnsolved(StepReport& report, StepFailure failure, double length, const std::string& why);
   Eigen::Vector3d load(const RodInputs& inputs, int node) const;
 
   // rod_stages.cpp: an implicit substep; the stages' equations are solved between beginStage and endStage or finishStep
@@ -58,15 +56,30 @@ public:
   void endStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
   void finishStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
 
-  // rod_explicit.cpp: an explicit substep; bodies move and constraints are projected between its two parts
+  // rod_explicit.cpp: an explicit substep; bodies move and constraints are projected between its two functions
   StepFailure explicitPredict(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
   StepFailure explicitFinish(const RodInputs& inputs, double duration, double t, double h);
-  void takeProjection(const FastProjection& projection, int chain);
+  /// Adds force(node) [N] on each node of active grasps to the wrenches of these. Those of grasps that bodies carry
+  /// change only with `carried`.
+  template <class Force>
+  void addToWrenches(const Force& force, bool carried = false)
+  {
+    for (std::size_t k = 0; k < wrenches.size(); ++k)
+    {
+      const GraspState& g = work.grasps[k];
+      for (int i = g.first_node; g.active && (carried || g.body < 0) && i <= g.last_node; ++i)
+      {
+        const Eigen::Vector3d f = force(i);
+        wrenches[k].force += f;
+        wrenches[k].torque += (work.x.col(i) - g.X_WG.position).cross(f);
+      }
+    }
+  }
   std::array<int, 2> overstretched{-1, -1};   ///< held nodes that the last failed projection found too far apart
 
 private:
   double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
-  std::string explainFailure(StepFailure failure, double length, bool explicit_step) const;
+  std::string explainFailure(StepFailure failure, double length) const;
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
   StepFailure computeAcceleration(const RodInputs& inputs, double duration, double t);
   Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node,
@@ -76,6 +89,11 @@ private:
 
   // rod_explicit.cpp
   RodEvaluation evaluateStart(const RodInputs& inputs, double duration, double t);
+  /// Of its elasticity and its loads on a node [N].
+  Eigen::Vector3d nodeForce(const RodInputs& inputs, int node) const
+  {
+    return load(inputs, node) - (isotropic ? isotropic->nodeGradient(node) : system.nodeGradient(node));
+  }
   void elasticWrenches(const RodInputs& inputs);
   void holdNodes(const RodInputs& inputs, double duration, double at);
 

@@ -57,6 +57,7 @@ private:
   BarrierRange barrierRange(double gap) const override;
   bool meetsMore() override { return thread_.firstLanding() <= 1.0; }
   void holdMore() override;
+  StepFailure predict(const Substep& substep, StepReport& report) override;
   StepFailure finishSubstep(StepReport& report) override;
   void acceptSubstep(const Substep&) override {}   // finishSubstep() changed the present state
   bool shorterMayHelp(StepFailure failure) const override;

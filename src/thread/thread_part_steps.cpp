@@ -80,6 +80,13 @@ void ThreadPart::holdMore()
   }
 }
 
+StepFailure ThreadPart::predict(const Substep& substep, StepReport&)
+{
+  length_ = substep.to - substep.from;
+  const StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
+  return failure == StepFailure::none ? thread_.move(length_) : failure;
+}
+
 StepFailure ThreadPart::finishSubstep(StepReport&) { return thread_.takeOver(length_, guard_); }
 
 /// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by

@@ -8,16 +8,15 @@
 #include <utility>
 
 #include "island/island.h"
-#include "slender_sim/linalg/interruption.h"
 #include "thread_part.h"
 
 namespace slender {
 
-/// What steps a thread that touches nothing but its floor: an island of its own, or explicit steps.
-class ThreadStepper::Alone : SubstepEquations
+/// What steps a thread that touches nothing but its floor: an island of its own.
+class ThreadStepper::Alone
 {
 public:
-  explicit Alone(Impl& thread) : thread_(thread), part_(thread), island_(timeOf(thread.newton), false)
+  explicit Alone(Impl& thread) : part_(thread), island_(timeOf(thread), false)
   {
     island_.equations().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
     island_.setParts({&part_});
@@ -26,53 +25,23 @@ public:
   /// From what the thread has loaded.
   StepReport step(double duration)
   {
-    duration_ = duration;
     part_.setDuration(duration);
     double first = 0.0;
-    return thread_.explicit_step ? stepExplicitly() : island_.step(duration, first);
+    return island_.step(duration, first);
   }
 
 private:
-  static TimeConfig timeOf(const NewtonConfig& newton)
+  static TimeConfig timeOf(const Impl& thread)
   {
     TimeConfig time;
-    time.integrator = Integrator::implicit_euler;
+    time.integrator = thread.explicit_step ? Integrator::symplectic_euler : Integrator::implicit_euler;
     time.error_tolerance = time.min_step = 0.0;
-    time.newton = newton;
+    time.newton = thread.newton;
     return time;
   }
 
-  StepReport stepExplicitly()
-  {
-    StepReport report;
-    SubstepRule rule;
-    rule.longest = evenSubstep(duration_, thread_.longestSubstep(duration_));
-    rule.max_cuts = thread_.newton.max_cuts;
-    SubstepController(rule).run(*this, duration_, report);
-    return report;
-  }
-
-  // ---- an explicit substep
-  StepFailure attempt(const Substep& substep, StepReport&) override
-  {
-    StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
-    if (failure == StepFailure::none)
-      failure = thread_.move(substep.to - substep.from);
-    return failure == StepFailure::none ? thread_.takeOver(substep.to - substep.from, nullptr) : failure;
-  }
-  void accept(const Substep&) override {}   // the attempt changes the work state only when it succeeds
-  bool shorterMayHelp(StepFailure) const override { return false; }
-  void refuse(const Substep& substep, StepFailure failure, StepReport& report) override
-  {
-    thread_.refuseUnsolved(report, failure, substep.length);
-    if (failure == StepFailure::interrupted)
-      report.message = kStepInterrupted;
-  }
-
-  Impl& thread_;
   ThreadPart part_;
   Island island_;
-  double duration_ = 0.0;   ///< of the present step [s]
 };
 
 namespace {

@@ -5,21 +5,16 @@
 
 namespace slender {
 
-namespace {
-
-/// Whether a body touches solids, and there are any besides its own.
 bool meetsSolids(const WorldModel& world, int body)
 {
   const std::optional<Shape>& shape = world.bodies[body].shape;
-  if (!shape || !(world.contact.gap > 0.0))
+  if (!world.bodies[body].body.simulated || !shape || !(world.contact.gap > 0.0))
     return false;
   bool others = !world.obstacles.empty();
   for (int b = 0; b < static_cast<int>(world.bodies.size()); ++b)
     others = others || (b != body && world.bodies[b].shape);
   return others;
 }
-
-}   // namespace
 
 BodyObject::BodyObject(const WorldModel& world, int number)
   : WorldObject(number),

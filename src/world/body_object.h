@@ -9,6 +9,9 @@
 
 namespace slender {
 
+/// Returns true if a simulated body touches solids, and there are any besides its own.
+bool meetsSolids(const WorldModel& world, int body);
+
 /// A simulated body.
 class BodyObject final : public WorldObject
 {

@@ -40,14 +40,17 @@ WorldContent checked(const WorldModel& world, WorldContent content)
   const bool simulates =
       std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return meetsOthers(world, r); }) ||
       std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return world.bodies[b].body.simulated; });
-  need(world.time.integrator != Integrator::symplectic_euler || !simulates,
-       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler "
-       "(time.integrator)");
   const auto touches = [](const auto& objects) { return [&](int k) { return objects[k].contact.has_value(); }; };
-  const bool may_join =
+  const bool touching =
       std::any_of(content.cloths.begin(), content.cloths.end(), touches(world.cloths)) ||
       std::any_of(content.rods.begin(), content.rods.end(), touches(world.rods)) ||
-      std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return world.bodies[b].shape; });
+      std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return meetsSolids(world, b); });
+  const bool may_join = touching || std::any_of(content.bodies.begin(), content.bodies.end(),
+                                                [&](int b) { return world.bodies[b].shape; });
+  need(world.time.integrator != Integrator::symplectic_euler || !simulates ||
+           !(touching || (touching_threads && may_join)),
+       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 "
+       "or tr_bdf2 (time.integrator)");
   need(!touching_threads || !simulates || !may_join || world.time.integrator == Integrator::implicit_euler,
        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
        "implicit_euler");
@@ -103,9 +106,9 @@ Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const
   return forces;
 }
 
-Eigen::Matrix3Xd IslandScheduler::rodContactForces(int rod) const
+Eigen::Matrix3Xd IslandScheduler::rodContactForces(int place) const
 {
-  return contactForces(objects_.rods[rod], *objects_.rods[rod].part);
+  return contactForces(objects_.rods[place], *objects_.rods[place].part);
 }
 
 Eigen::Matrix3Xd IslandScheduler::clothContactForces(int cloth) const

@@ -11,8 +11,7 @@
 
 namespace slender {
 
-/// Rods, threads, cloths and bodies that contact or welds can join, and the obstacles that they meet, in implicit
-/// steps.
+/// Rods, threads, cloths and bodies that contact or welds can join, and the obstacles that they meet.
 ///
 /// In each step the parts are divided into islands. The division begins with parts that are joined, or that would come
 /// near each other if they kept their velocities. When all islands have made their step, parts of different islands
@@ -33,19 +32,16 @@ public:
   void addSolidLoads(SolidLoads& out) const override;
   void forgetContacts() override { islands_.clear(); }
   void setThreads(int threads) override { loop_.threads = threads; }
-  const std::vector<Wrench>& wrenches(int rod) const override { return objects_.rods[rod].stepper->wrenches; }
-  Eigen::Matrix3Xd rodContactForces(int rod) const override;
-  RodEnergies rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const override
-  {
-    return objects_.rods[rod].stepper->energies(state, gravity);
-  }
-  RodStepper* stepper(int rod) override { return objects_.rods[rod].alone(); }
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
   {
     return objects_.cloths[cloth].energies(state, gravity);
   }
   const Eigen::Matrix3Xd& pinForces(int cloth) const override { return objects_.cloths[cloth].pinForces(); }
   Eigen::Matrix3Xd clothContactForces(int cloth) const override;
+
+  /// A rod, named by its place in the content.
+  RodObject& rod(int place) { return objects_.rods[place]; }
+  Eigen::Matrix3Xd rodContactForces(int place) const;   ///< on its nodes [N]
 
 private:
   Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part) const;

@@ -8,7 +8,7 @@
 namespace slender {
 
 /// Objects of the world that are stepped one group after the other. A group knows which objects of the world it holds.
-/// Its rods and cloths are named by their place in the group. Private to the world.
+/// Its cloths are named by their place in the group. Private to the world.
 class StepGroup
 {
 public:
@@ -31,13 +31,6 @@ public:
   /// The state is another one: there was no last step.
   virtual void forgetContacts() {}
   virtual void setThreads(int) {}
-
-  // ---- of groups that hold rods
-  virtual const std::vector<Wrench>& wrenches(int) const { throw std::logic_error("this group has no rods"); }
-  virtual RodEnergies rodEnergies(int, const RodState&, const Eigen::Vector3d&) const { return {}; }
-  /// Forces of contact on the nodes of a rod [N]; without columns for a rod that touches nothing.
-  virtual Eigen::Matrix3Xd rodContactForces(int) const { return Eigen::Matrix3Xd(3, 0); }
-  virtual RodStepper* stepper(int) { return nullptr; }   ///< of a rod that meets nothing
 
   // ---- of groups that hold cloths
   virtual ClothEnergies clothEnergies(int, const ClothState&, const Eigen::Vector3d&) const { return {}; }

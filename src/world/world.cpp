@@ -8,8 +8,6 @@
 
 #include "cloth_groups.h"
 #include "island_scheduler.h"
-#include "explicit_rods.h"
-#include "group_loop.h"
 #include "tracked_parts.h"
 
 namespace slender {
@@ -123,7 +121,6 @@ public:
   {
     if (threads < 1)
       throw std::invalid_argument("threads = " + std::to_string(threads) + "; must be at least 1");
-    separate_loop_.threads = threads;
     for (const auto& group : groups_)
       group->setThreads(threads);
   }
@@ -149,6 +146,8 @@ public:
       group->forgetContacts();
   }
 
+  RodObject& rod(int number) const { return islands->rod(rods.at(number)); }
+
   SolidLoads solidLoads() const
   {
     SolidLoads all{std::vector<SolidLoad>(model.obstacles.size()), std::vector<SolidLoad>(model.bodies.size())};
@@ -165,7 +164,9 @@ public:
     StepGroup* group = nullptr;
     int index = 0;   ///< in the group
   };
-  std::vector<Place> rods, cloths;
+  IslandScheduler* islands = nullptr;   ///< that has the rods; null: there is nothing for it to step
+  std::vector<int> rods;                ///< per rod: its place there
+  std::vector<Place> cloths;
 
 private:
   StepGroup* add(std::unique_ptr<StepGroup> group)
@@ -204,12 +205,12 @@ private:
       place(cloths, touching, add(built(Kind::none, -1, [&] { return makeTouchingCloths(model, touching); })));
   }
 
-  void addScheduler(const WorldContent& content, WorldState& state)
+  IslandScheduler* addScheduler(const WorldContent& content, WorldState& state)
   {
-    StepGroup* group =
-        add(built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); }));
-    place(rods, content.rods, group);
-    place(cloths, content.cloths, group);
+    auto group = built(Kind::none, -1, [&] { return std::make_unique<IslandScheduler>(model, content, state); });
+    IslandScheduler* const added = group.get();
+    place(cloths, content.cloths, add(std::move(group)));
+    return added;
   }
 
   void checkThreads() const
@@ -220,8 +221,7 @@ private:
       });
   }
 
-  /// Rods, threads, simulated bodies, and cloths that do not collide by impulses. Rods that take explicit steps have
-  /// groups of their own.
+  /// Rods, threads, simulated bodies, and cloths that do not collide by impulses.
   void addIslands(WorldState& state)
   {
     WorldContent content;
@@ -238,28 +238,11 @@ private:
     if (touching || !content.rods.empty() ||
         std::any_of(bodies.begin(), bodies.end(), [this](int b) { return model.bodies[b].body.simulated; }))
       content.bodies = bodies;
-    separate_begin_ = groups_.size();
-    const bool explicit_steps = model.time.integrator == Integrator::symplectic_euler;
-    if (explicit_steps)
-      for (const int r : alone)
-        addSeparate(r, [&] { return makeExplicitRods(model, {{r}, {}, {}, {}}, state); });
-    else
-      content.rods.insert(content.rods.end(), alone.begin(), alone.end());
-    separate_end_ = groups_.size();
-    const bool shown = std::any_of(model.bodies.begin(), model.bodies.end(),
-                                   [](const WorldModel::Body& body) { return body.shape.has_value(); });
-    const bool joined = cloths_touch || (touching && (anyTouches(model.rods) || shown));
-    if (explicit_steps && !joined)
-    {
-      if (!content.rods.empty() || !content.bodies.empty())
-        place(rods, content.rods, add(built(Kind::none, -1, [&] {
-                return makeExplicitRods(model, {content.rods, {}, content.bodies, {}}, state);
-              })));
-      content.rods.clear();
-      content.bodies.clear();
-    }
+    content.rods.insert(content.rods.end(), alone.begin(), alone.end());
+    for (std::size_t k = 0; k < content.rods.size(); ++k)
+      rods[content.rods[k]] = static_cast<int>(k);
     if (!(content.rods.empty() && content.threads.empty() && content.bodies.empty() && content.cloths.empty()))
-      addScheduler(content, state);
+      islands = addScheduler(content, state);
   }
 
   /// Simulated ones, and driven ones that rods are welded to or that have a shape.
@@ -286,23 +269,10 @@ private:
       places[objects[k]] = {group, static_cast<int>(k)};
   }
 
-  template <class Make>
-  void addSeparate(int r, const Make& make)
-  {
-    separate_nodes_ += model.rods[r].model->nodes();
-    rods[r] = {add(built(Kind::rod, r, make)), 0};
-  }
-
   StepReport stepGroups(WorldState& state, const WorldInputs& inputs)
   {
     StepReport total;
-    for (std::size_t i = 0; i < separate_begin_ && total.ok; ++i)
-      total.merge(groups_[i]->step(state, inputs));
-    if (total.ok && separate_end_ > separate_begin_)
-      separate_loop_.run(
-          static_cast<int>(separate_end_ - separate_begin_), separate_nodes_,
-          [&](int k) { return groups_[separate_begin_ + k]->step(state, inputs); }, total);
-    for (std::size_t i = separate_end_; i < groups_.size() && total.ok; ++i)
+    for (std::size_t i = 0; i < groups_.size() && total.ok; ++i)
       total.merge(groups_[i]->step(state, inputs));
     return total;
   }
@@ -321,14 +291,10 @@ private:
       move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
   }
 
-  /// In the order in which they step: cloths that lead others, cloths that collide by impulses, rods that take explicit
-  /// steps and meet nothing, all others.
+  /// In the order in which they step: cloths that lead others, cloths that collide by impulses, all others.
   std::vector<std::unique_ptr<StepGroup>> groups_;
-  std::size_t separate_begin_ = 0, separate_end_ = 0;   ///< among them the rods that meet nothing
-  int separate_nodes_ = 0;
   std::vector<int> given_bodies_;   ///< driven bodies
   WorldState before_;               ///< a step that may fail in one of several groups
-  GroupLoop separate_loop_;
 };
 
 World::World(WorldModel model, WorldState& state)
@@ -346,23 +312,14 @@ StepReport World::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
 void World::setThreads(int threads) { impl_->setThreads(threads); }
 void World::checkCloths(WorldState& state) { impl_->checkCloths(state); }
 
-const std::vector<Wrench>& World::rodWrenches(int rod) const
-{
-  const auto& place = impl_->rods.at(rod);
-  return place.group->wrenches(place.index);
-}
+const std::vector<Wrench>& World::rodWrenches(int rod) const { return impl_->rod(rod).stepper->wrenches; }
 
 RodEnergies World::rodEnergies(int rod, const RodState& state, const Eigen::Vector3d& gravity) const
 {
-  const auto& place = impl_->rods.at(rod);
-  return place.group->rodEnergies(place.index, state, gravity);
+  return impl_->rod(rod).stepper->energies(state, gravity);
 }
 
-RodStepper* World::rodStepper(int rod)
-{
-  const auto& place = impl_->rods.at(rod);
-  return place.group->stepper(place.index);
-}
+RodStepper* World::rodStepper(int rod) { return impl_->rod(rod).alone(); }
 
 const Eigen::Matrix3Xd& World::pinForces(int cloth) const
 {
@@ -372,8 +329,7 @@ const Eigen::Matrix3Xd& World::pinForces(int cloth) const
 
 Eigen::Matrix3Xd World::rodContactForces(int rod) const
 {
-  const auto& place = impl_->rods.at(rod);
-  const Eigen::Matrix3Xd forces = place.group->rodContactForces(place.index);
+  const Eigen::Matrix3Xd forces = impl_->islands->rodContactForces(impl_->rods.at(rod));
   return forces.cols() > 0 ? forces : Eigen::Matrix3Xd::Zero(3, impl_->model.rods[rod].model->nodes());
 }
 

@@ -395,6 +395,45 @@ TEST(ExplicitSteps, ContactIsRefused)
   Group g = tee();
   g.model.rods[0].contact.emplace();
   EXPECT_THROW(g.world(kExplicit, 1e-4), std::invalid_argument);
+
+  Group ball;
+  ball.addBody(bodyOf(1.0, {1e-3, 1e-3, 1e-3}), {});
+  ball.model.bodies[0].shape = Sphere{0.1};
+  ball.model.contact.gap = 1e-3;
+  EXPECT_NO_THROW(World(ball.model, ball.state));
+  ball.model.time = kExplicit;
+  EXPECT_NO_THROW(World(ball.model, ball.state));   // it meets nothing
+  ball.addObstacle(Plane{}, {Vector3d(0, 0, -1), Eigen::Quaterniond::Identity()});
+  EXPECT_THROW(World(ball.model, ball.state), std::invalid_argument);
+}
+
+/// Rods and bodies that no weld joins do not change each other's projection.
+TEST(ExplicitSteps, BystandersChangeNothing)
+{
+  Group g[2] = {tee(), tee()};
+  Rod rod = straightRod(11, 1.0, modulusSection(1e-4, 1e-4, 10.0, 0.1));
+  Twist spin;
+  spin.angular << 30, 20, 10;
+  const int far = g[1].addRod(rod);
+  g[1].weld(far, 10, 10,
+            g[1].addBody(bodyOf(0.1, {1e-4, 1e-4, 2e-4}), {rod.state.x.col(10), Eigen::Quaterniond::Identity()}, spin));
+  for (Group& group : g)
+  {
+    for (WorldModel::Rod& changed : group.model.rods)
+    {
+      auto model = std::make_shared<RodModel>(*changed.model);
+      model->inextensible = true;
+      changed.model = model;
+    }
+    World world = group.world(kExplicit, 2e-5);
+    for (int k = 0; k < 500; ++k)
+    {
+      const StepReport report = world.step(group.state, group.inputs);
+      ASSERT_TRUE(report.ok) << report.message;
+    }
+  }
+  for (std::size_t r = 0; r < g[0].state.rods.size(); ++r)
+    EXPECT_TRUE(bitEqual(g[0].state.rods[r], g[1].state.rods[r])) << r;
 }
 
 }   // namespace

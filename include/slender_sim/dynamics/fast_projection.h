@@ -53,8 +53,7 @@ public:
 
   /// Held nodes stay where the trial has them.
   void hold(int chain, int node) { setOwner(chain, node, kHeld); }
-  void release(int chain, int node) { setOwner(chain, node, kFree); }
-  void releaseAll(int chain);
+  void releaseAll(int chain);   ///< No node of the chain is held or welded.
   /// The node goes rigidly with a body, at r_B in its axes [m]; its own mass is not counted: add it to the body's.
   void weld(int chain, int node, int body, const Eigen::Vector3d& r_B);
 

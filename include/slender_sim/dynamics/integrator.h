@@ -56,6 +56,10 @@ void planStep(Integrator integrator, double spectral_radius, double h, double pr
 /// most 1e15, whose end nobody sees.
 long stepsUntil(double end, double step);
 
+/// Returns true for symplectic_euler and imex, which solve no nonlinear equations. Their steps have one length, on
+/// which their stability depends.
+bool isExplicit(Integrator integrator);
+
 /// Constant C in the local position error C h^2 |a1 - a0| (second order) or C h^2 |a1| (implicit Euler).
 double errorConstant(Integrator integrator);
 

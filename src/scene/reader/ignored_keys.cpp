@@ -326,8 +326,7 @@ void warnOfCloth(YamlMap cloth, const SceneConfig& scene, const ClothConfig& con
   const YamlCursor model = bending.find("model"), modulus = bending.find("modulus");
   if (model.isScalar() && model.tree()->scalar == "none" && modulus.present())
     modulus.warning("has no effect with model: none, which does not bend at all; leave it out, or take another model");
-  const bool explicit_steps =
-      scene.time.integrator == Integrator::symplectic_euler || scene.time.integrator == Integrator::imex;
+  const bool explicit_steps = isExplicit(scene.time.integrator);
   if (explicit_steps && solver.at().present())
   {
     solver.at().warning(std::string("has no effect with time.integrator: ") + toString(scene.time.integrator) +

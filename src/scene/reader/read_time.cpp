@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "read_parts.h"
+#include "slender_sim/dynamics/integrator.h"
 
 namespace slender {
 
@@ -34,8 +35,7 @@ TimeConfig readTime(const YamlCursor& at)
               "Largest error of a position that one step may make; `time.step` is then the longest step, and shorter "
               "ones are taken where they are needed. Without the key, or with 0, steps have a fixed length.");
   assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
-  if (time.error_tolerance > 0 &&
-      (time.integrator == Integrator::symplectic_euler || time.integrator == Integrator::imex))
+  if (time.error_tolerance > 0 && isExplicit(time.integrator))
     error_tolerance.problem("is for implicit integrators; steps of symplectic_euler and imex are of fixed length");
   const YamlCursor min_step = map.get("min_step",
                                       "Shortest step to which the error control and halving may go. Without the key: "

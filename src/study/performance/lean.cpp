@@ -162,7 +162,7 @@ std::vector<Feature> features()
        {kRod, kExplicitRod, kThread, kCloth, kTracked, rod_on_floor, cloth_on_ball, thread_with_itself},
        {with(kRod, {welded_disc})}},
       {"rigid bodies",
-       {"src/rod/body_system", "src/rod/body_part", "include/slender_sim/rod/rigid_body",
+       {"src/rod/body_system", "src/rod/body_part", "src/rod/body_explicit", "include/slender_sim/rod/rigid_body",
         "src/dynamics/fast_projection_bodies"},
        "\\b[bB]od(y|ies)|\\bweld",
        all,
