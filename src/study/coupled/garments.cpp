@@ -30,6 +30,8 @@ constexpr double kGarmentStep = 0.005;                        // [s]
 constexpr double kClothThickness = 0.002;                     // of the cloth in contact [m]
 constexpr double kRoundingOfRoom = 1e-9;                      // [m]
 constexpr double kQuickSeconds = 0.7, kFinestSeconds = 1.0;   // simulated at most, with 400 and with 6,400 vertices
+/// CPU time after which a run ends unfinished [s]. Runs in real time take less than a fiftieth of it.
+constexpr double kMostCpuSeconds = 200.0;
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
 /// A garment around the standing figure, in the frame of the part that holds it.
@@ -258,7 +260,9 @@ struct GarmentRun
 
 struct GarmentResult
 {
-  int steps = 0, iterations = 0, most_iterations = 0, cut_steps = 0, penetrations = 0;
+  int steps = 0;
+  bool finished = false;
+  int iterations = 0, most_iterations = 0, cut_steps = 0, penetrations = 0;
   double cpu_seconds = 0.0;
   double room = kFar, held_room = kFar;   ///< [m]
   std::string refusal;                    ///< empty: none
@@ -267,12 +271,13 @@ struct GarmentResult
   double realTimeFactor() const { return kGarmentStep * steps / cpu_seconds; }
 };
 
-/// Steps a garment until the end of the motion, or until a step is refused. All pairs are checked every `every` steps.
+/// Steps a garment until the end of the motion, until a step is refused, or until it has taken kMostCpuSeconds. All
+/// pairs are checked every `every` steps.
 GarmentResult wear(Simulation& scene, const LimbCheck& limbs, int steps, int every)
 {
   GarmentResult result;
   MixedCheck pairs(scene, MixedCheck::Faces::without_held_corners);
-  for (int& k = result.steps; k < steps; ++k)
+  for (int& k = result.steps; k < steps && result.cpu_seconds < kMostCpuSeconds; ++k)
   {
     const double start = threadSeconds();
     const StepReport report = scene.step(scene.defaultInputs());
@@ -298,6 +303,7 @@ GarmentResult wear(Simulation& scene, const LimbCheck& limbs, int steps, int eve
     if (result.first.empty() && !found.first.empty())
       result.first = "at " + std::to_string(time) + " s " + found.first;
   }
+  result.finished = result.steps == steps || !result.refusal.empty();
   return result;
 }
 
@@ -347,7 +353,7 @@ void runGarments(StudyContext& context)
   if (context.quick())
     motions.resize(1);
   const int total = static_cast<int>(motions.size() * runs.size());
-  int done = 0, refused = 0, penetrations = 0;
+  int done = 0, refused = 0, unfinished = 0, penetrations = 0;
   double room = kFar;
   double factor[5] = {kFar, kFar, kFar, kFar, kFar};   // by fineness
   for (const GarmentRun& run : runs)
@@ -356,11 +362,13 @@ void runGarments(StudyContext& context)
       context.progress(done++, total, motion.name + ", " + run.garment);
       const GarmentResult result = runGarment(context, motion, run);
       refused += !result.refusal.empty();
+      unfinished += !result.finished;
       penetrations += result.penetrations;
       room = std::min(room, result.room);
       factor[run.fineness] = std::min(factor[run.fineness], result.realTimeFactor());
     }
   context.metric("refused", refused);
+  context.metric("unfinished", unfinished);
   context.metric("penetrations", penetrations);
   context.metric("least_room_um", 1e6 * room);
   context.metric("real_time_factor_400", factor[1]);

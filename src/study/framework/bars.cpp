@@ -68,6 +68,7 @@ const std::vector<Bar>& bars()
       {"coupled_safety", "unexplained_failures", at_most, 0},
       {"coupled_safety", "scenes", at_least, 1000, result, full},
       {"garments", "refused", at_most, 0},
+      {"garments", "unfinished", at_most, 0},
       {"garments", "penetrations", at_most, 0},
       {"garments", "real_time_factor_400", at_least, 1, timing},
       {"garments", "real_time_factor_1600", at_least, 0.5, timing, full},
