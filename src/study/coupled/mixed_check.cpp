@@ -109,7 +109,7 @@ double linkingIntegral(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y)
 
 }   // namespace
 
-MixedCheck::MixedCheck(const Simulation& scene)
+MixedCheck::MixedCheck(const Simulation& scene, Faces against_solids)
 {
   const SceneConfig& config = scene.config();
   gap_ = config.contact.gap;
@@ -129,10 +129,17 @@ MixedCheck::MixedCheck(const Simulation& scene)
   for (std::size_t c = 0; c < config.cloths.size(); ++c)
   {
     const ClothModel& model = scene.clothModel(static_cast<int>(c));
+    const std::vector<int>& pins = scene.state().cloths[c].pins;
     for (Eigen::Index t = 0; t < model.rest.triangles.cols(); ++t)
+    {
+      const Eigen::Vector3i corner = model.rest.triangles.col(t);
+      const bool held =
+          std::any_of(corner.begin(), corner.end(), [&](int v) { return std::count(pins.begin(), pins.end(), v) > 0; });
       faces_.push_back({static_cast<int>(names_.size()),
-                        {model.rest.triangles(0, t), model.rest.triangles(1, t), model.rest.triangles(2, t)},
-                        0.5 * config.cloths[c].contact->thickness});
+                        {corner[0], corner[1], corner[2]},
+                        0.5 * config.cloths[c].contact->thickness,
+                        against_solids == Faces::all || !held});
+    }
     names_.push_back("cloth " + model.name);
     rest_.push_back(model.rest.vertices);
   }
@@ -269,6 +276,8 @@ void MixedCheck::checkSolids(MixedFindings& out) const
     }
     for (const Face& f : faces_)
     {
+      if (!f.against_solids)
+        continue;
       const Eigen::Matrix3Xd& x = x_[f.object];
       const Vector3d v[3] = {inverse * Vector3d(x.col(f.corner[0])), inverse * Vector3d(x.col(f.corner[1])),
                              inverse * Vector3d(x.col(f.corner[2]))};

@@ -22,8 +22,15 @@ struct MixedFindings
 class MixedCheck
 {
 public:
+  /// Which faces of cloths are checked against solids. Solids that move as prescribed pass through those corners and
+  /// edges of faces that are held (contact_potential.h).
+  enum class Faces
+  {
+    all,
+    without_held_corners
+  };
   /// The scene as it starts.
-  explicit MixedCheck(const Simulation& scene);
+  explicit MixedCheck(const Simulation& scene, Faces against_solids = Faces::all);
   /// The scene after a step.
   MixedFindings check(const Simulation& scene);
 
@@ -38,6 +45,7 @@ private:
     int object;
     int corner[3];
     double half_thickness;   ///< [m]
+    bool against_solids;
   };
   /// A solid shape, or the rounded surface of a body.
   struct Solid

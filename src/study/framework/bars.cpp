@@ -67,6 +67,11 @@ const std::vector<Bar>& bars()
       {"coupled_safety", "nan_count", at_most, 0},
       {"coupled_safety", "unexplained_failures", at_most, 0},
       {"coupled_safety", "scenes", at_least, 1000, result, full},
+      {"garments", "refused", at_most, 0},
+      {"garments", "unfinished", at_most, 0},
+      {"garments", "penetrations", at_most, 0},
+      {"garments", "real_time_factor_400", at_least, 1, timing},
+      {"garments", "real_time_factor_1600", at_least, 0.5, timing, full},
       {"sticking", "most_slip", at_most, 1e-9},   // [m] far below what a sensor or an eye can tell
       {"capstan", "order", at_least, 1.9},
       {"projection", "length_error_max", at_most, 1e-8},

@@ -36,6 +36,7 @@ public:
   }
   PackageFolder(const PackageFolder&) = delete;
   PackageFolder& operator=(const PackageFolder&) = delete;
+  const std::string& path() const { return path_; }
   std::string scenes() const { return path_ + "/scenes"; }
 
 private:
@@ -54,6 +55,11 @@ SceneConfig packageSceneConfig(const std::string& name, const std::vector<std::s
 Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides)
 {
   return Simulation(packageSceneConfig(name, overrides));
+}
+
+std::vector<BodyTrajectory> packageMotion(const std::string& name)
+{
+  return readPoseFile(PackageFolder().path() + "/motion/" + name + ".csv");
 }
 
 GroupSetup groupOf(const Simulation& scene)

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "study/rod/contact_cases.h"
+#include "slender_sim/scene/pose_file.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/study/study.h"
 
@@ -14,6 +15,10 @@ namespace slender::study {
 SceneConfig packageSceneConfig(const std::string& name, const std::vector<std::string>& overrides = {});
 /// The same, composed. Throws SimulationError as well.
 Simulation packageScene(const std::string& name, const std::vector<std::string>& overrides = {});
+
+/// config/motion/NAME.csv, timed poses of bodies, as it was when the package was built. Throws SceneError if it is not
+/// among the files built in.
+std::vector<BodyTrajectory> packageMotion(const std::string& name);
 
 /// The rods, obstacles and contact of a scene without bodies, where they are now; grasps and obstacles stay.
 GroupSetup groupOf(const Simulation& scene);

@@ -77,20 +77,6 @@ Eigen::Quaterniond about(const Vector3d& axis, double angle)
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis));
 }
 
-/// Angle [rad] of a joint of the right side in a walk: mean and two harmonics, fitted to a recorded walk (CMU motion
-/// capture; 1.25 s for two steps, 0.98 m/s). Flexion forwards; the left side follows half a period later.
-struct Swing
-{
-  double mean, c1, s1, c2, s2;
-  double at(double phase) const
-  {
-    return mean + c1 * std::cos(phase) + s1 * std::sin(phase) + c2 * std::cos(2 * phase) + s2 * std::sin(2 * phase);
-  }
-};
-constexpr Swing kHipSwing{0.173, 0.311, -0.168, -0.083, -0.002}, kKneeSwing{0.540, -0.128, -0.437, -0.245, 0.222},
-    kShoulderSwing{-0.063, -0.299, 0.117, -0.027, -0.011}, kElbowSwing{0.327, -0.188, 0.056, 0.015, -0.005};
-constexpr double kSpeed = 0.98;   // [m/s]
-
 }   // namespace
 
 Biped::Biped(double cell)
@@ -184,7 +170,7 @@ std::vector<Pose> Biped::poses(double t) const
   const Vector3d sideways = Vector3d::UnitY();
   std::vector<Pose> pose(kBodies);
   const double phase = 2 * M_PI * t / kPeriod;
-  const Pose root{{kSpeed * std::max(0.0, t - 0.125 * (1 - ease)) * ease, 0, 0.015 * ease * std::cos(2 * phase)},
+  const Pose root{{kWalkSpeed * std::max(0.0, t - 0.125 * (1 - ease)) * ease, 0, 0.015 * ease * std::cos(2 * phase)},
                   Eigen::Quaterniond::Identity()};
   pose[hips] = root;
   pose[chest] = root * turnedAbout({0, 0, kWaist}, about(Vector3d::UnitZ(), 0.12 * ease * std::cos(phase)));

@@ -5,6 +5,7 @@
 
 #include "slender_sim/geometry/triangle_mesh.h"
 #include "slender_sim/tracking/guide_binding.h"
+#include "walk_angles.h"
 
 namespace slender::study {
 
@@ -20,7 +21,7 @@ public:
   const std::vector<int>& bodyOfFace() const { return body_of_face_; }   ///< that moves it, for the most part
   /// vertices [m] at a time [s]; at rest at t <= 0, in full swing from 0.25 s on
   Eigen::Matrix3Xd at(double t) const;
-  static constexpr double kPeriod = 1.25;   ///< of two steps [s]
+  static constexpr double kPeriod = kWalkPeriod;   ///< of two steps [s]
 
 private:
   std::vector<Pose> poses(double t) const;
