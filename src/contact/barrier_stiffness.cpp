@@ -79,11 +79,11 @@ bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)
   const double before = value_;
   if (converged)
     adapt(barrier);
-  else
-    value_ = 4.0 * stiffness_there_;
+  else   // the forces are far too large where a gap has collapsed
+    value_ =
+        std::clamp(largest_force_ / barrier.force(barrier.c / 5), 4.0 * stiffness_there_, 100.0 * stiffness_there_);
   bound();
   value_before_ = before;
-  share_before_ = share_;
   stiffened_ = true;
   return value_ > before;
 }

@@ -22,7 +22,8 @@ public:
   /// the pair repels.
   void take(double force, double stiffness, double share);
 
-  void beginStep();   ///< The last evaluation was where a step begins.
+  void beginStep();                                  ///< The last evaluation was where a step begins.
+  void beginSolution() { share_before_ = share_; }   ///< likewise
   /// See ContactPotential::adaptStiffness() and stiffen().
   void adapt(const Barrier& barrier);
   bool stiffen(const Barrier& barrier, bool converged);
@@ -38,8 +39,8 @@ private:
   double share_ = std::numeric_limits<double>::infinity();          ///< smallest gap over that which repels
   double stiffness_there_ = 0.0;                                    ///< of the barrier of this smallest gap
   double share_begin_ = std::numeric_limits<double>::infinity();    ///< share_ at beginStep()
-  double share_before_ = std::numeric_limits<double>::infinity();   ///< share_ before the barrier was made stiffer
-  double value_before_ = 0.0;                                       ///< its stiffness until then
+  double share_before_ = std::numeric_limits<double>::infinity();   ///< share_ at beginSolution()
+  double value_before_ = 0.0;                                       ///< stiffness before the barrier was made stiffer
   bool stiffened_ = false, narrow_ = false;   ///< in this step; narrow: a stiffer barrier has opened no gap
 };
 

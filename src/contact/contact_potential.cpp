@@ -396,6 +396,12 @@ void ContactPotential::adaptStiffness()
     own.adapt(impl_->barrier);
 }
 
+void ContactPotential::beginSolution()
+{
+  for (BarrierStiffness& own : impl_->stiffness)
+    own.beginSolution();
+}
+
 bool ContactPotential::stiffen(bool converged)
 {
   bool changed = false;

@@ -30,11 +30,13 @@ enum class Approach
 template <class System>
 NewtonResult minimizeConfined(System& system, double from, double to, const NewtonConfig& newton, double gap)
 {
-  constexpr int kMaxApproaches = 200, kMaxSolutions = 24, kMaxFailures = 8;
+  constexpr int kMaxApproaches = 200, kMaxIdle = 10, kMaxSolutions = 24, kMaxFailures = 8;
+  constexpr double kLeastAdvance = 1e-3;   // of the way; less is none
   constexpr double kLagTolerance = 1e-2;
   NewtonResult total;
   const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
     system.resolve(config.tolerance, gap_tolerance);
+    system.contact()->beginSolution();
     const NewtonResult r = minimize(system, config);
     const int iterations = total.iterations + r.iterations, factorizations = total.factorizations + r.factorizations;
     total = r;
@@ -54,11 +56,12 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   fine.max_iterations = 2 * newton.max_iterations;   // contacts that come and go cost more than a substep cut in two
   loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
   loose.max_iterations = 12;
-  for (int k = 0;; ++k)
+  const double least = kLeastAdvance * (to - from);
+  for (int k = 0, idle = 0;; ++k)
   {
     double reached = to;
-    const Approach approach =
-        k == kMaxApproaches || stepsInterrupted() ? Approach::squeezed : system.approach(from, to, reached);
+    const bool stuck = k == kMaxApproaches || idle == kMaxIdle || stepsInterrupted();
+    const Approach approach = stuck ? Approach::squeezed : system.approach(from, to, reached);
     if (approach == Approach::squeezed)
     {
       total.failure = StepFailure::squeezed;
@@ -71,6 +74,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     if (total.failure == StepFailure::work_exceeded)
       return total;
     system.accept();
+    idle = reached - from < least ? idle + 1 : 0;
     from = reached;
     system.advance(to);
   }

@@ -261,10 +261,12 @@ public:
   void adaptStiffness();
   /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. If a gap has
   /// shrunk below a twelfth of the gap since begin(), or is below a fiftieth, the barriers of what touches there are
-  /// made stiffer: as adaptStiffness() would where a solution has `converged`, fourfold where forces mean nothing yet.
-  /// Gaps of what lies in a narrow place do not open then: the next call takes the stiffness back, and it stays what it
-  /// was until begin(). Returns whether a barrier has changed.
+  /// made stiffer: as adaptStiffness() would where a solution has `converged`, else four- to a hundredfold. Gaps of
+  /// what lies in a narrow place do not open then: the next call takes the stiffness back, and it stays what it was
+  /// until begin(). Returns whether a barrier has changed.
   bool stiffen(bool converged);
+  /// The last evaluate() was where a solution begins: stiffen() tells from there whether gaps have opened.
+  void beginSolution();
 
 private:
   class Impl;
