@@ -24,14 +24,15 @@ enum class Approach
 /// System offers what minimize() needs, and:
 /// - approach(from, to, reached): goes from the base towards the present trial, as far as nothing touches. That
 ///   becomes the base, where all that is prescribed stands at the fraction `reached`;
-/// - advance(to): puts what is held or driven, in the trial, where it is at `to`, and moves along what it pushes;
+/// - pushes(): whether something that is driven moves;
+/// - advance(to): puts what is held or driven, in the trial, where it is at `to`, and moves along what is pushed;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
 /// - contact(): the ContactPotential.
 template <class System>
 NewtonResult minimizeConfined(System& system, double from, double to, const NewtonConfig& newton, double gap)
 {
-  constexpr int kMaxApproaches = 200, kMaxIdle = 10, kMaxSolutions = 24, kMaxFailures = 8;
-  constexpr double kLeastAdvance = 1e-3;   // of the way; less is none
+  constexpr int kMaxApproaches = 200, kMaxIdle = 10, kQuickAdvances = 3, kMaxSolutions = 24, kMaxFailures = 8;
+  constexpr double kLeastAdvance = 1e-3, kFarAdvance = 0.2;   // of the way; less than the least is none
   constexpr double kLagTolerance = 1e-2;
   NewtonResult total;
   const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
@@ -54,9 +55,15 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   NewtonConfig fine = newton, loose = newton;
   fine.tolerance = std::max(newton.tolerance, 1e-3 * gap);
   fine.max_iterations = 2 * newton.max_iterations;   // contacts that come and go cost more than a substep cut in two
+  // Each advance of what pushes is an iteration as well, so that few are needed between two of them. Where many
+  // advances do not arrive, as in folds, each of them goes farther after a better solution.
   loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
   loose.max_iterations = 12;
-  const double least = kLeastAdvance * (to - from);
+  NewtonConfig quick = newton;
+  quick.tolerance = std::max(newton.tolerance, 0.5 * gap);
+  quick.max_iterations = 3;
+  const double way = to - from;
+  const bool pushes = system.pushes();
   for (int k = 0, idle = 0;; ++k)
   {
     double reached = to;
@@ -69,12 +76,14 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     }
     if (approach == Approach::arrived)
       break;
-    // what is in the way gives way, then on from there
-    system.contact()->stiffen(solve(loose, 0.1));
+    // What is in the way gives way, then on from there. A far advance has pushed it along already.
+    const bool is_quick = pushes && k < kQuickAdvances;
+    if (!is_quick || reached - from < kFarAdvance * way)
+      system.contact()->stiffen(is_quick ? solve(quick, 1.0) : solve(loose, 0.1));
     if (total.failure == StepFailure::work_exceeded)
       return total;
     system.accept();
-    idle = reached - from < least ? idle + 1 : 0;
+    idle = reached - from < kLeastAdvance * way ? idle + 1 : 0;
     from = reached;
     system.advance(to);
   }

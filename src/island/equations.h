@@ -119,6 +119,7 @@ private:
   double residual() const;
   double noiseLevel() const;
   Approach approach(double from, double to, double& reached);
+  bool pushes() const { return solidsMove(); }
   void advance(double to);
   void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
 

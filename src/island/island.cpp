@@ -168,9 +168,7 @@ bool Island::loadContact(double h)
       return false;
   }
   if (attraction_)
-  {
     attraction_->begin(equations_.startPoints(), surface_, contact->nearPairs(), gap_, h);
-  }
   loadStiffness(attraction_ ? attraction_->largestForce() : 0.0);   // not what an attempt that failed left
   contact->setSprings(springs);
   return true;
