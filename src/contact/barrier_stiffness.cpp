@@ -17,7 +17,7 @@ void BarrierStiffness::set(double force, const BarrierRange& range)
   bound();
 }
 
-/// Of loads that overflow, the stiffness stays finite: what they do to the parts says why the step fails.
+/// The stiffness stays finite if loads overflow. The step then fails with a reason that names the part.
 void BarrierStiffness::bound()
 {
   value_ = std::min(std::max(value_, range_.least), std::min(range_.most, std::numeric_limits<double>::max()));
@@ -79,7 +79,7 @@ bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)
   const double before = value_;
   if (converged)
     adapt(barrier);
-  else   // the forces are far too large where a gap has collapsed
+  else   // Where a gap has collapsed, the forces are far too large to follow them.
     value_ =
         std::clamp(largest_force_ / barrier.force(barrier.c / 5), 4.0 * stiffness_there_, 100.0 * stiffness_there_);
   bound();

@@ -41,7 +41,8 @@ private:
   double share_begin_ = std::numeric_limits<double>::infinity();    ///< share_ at beginStep()
   double share_before_ = std::numeric_limits<double>::infinity();   ///< share_ at beginSolution()
   double value_before_ = 0.0;                                       ///< stiffness before the barrier was made stiffer
-  bool stiffened_ = false, narrow_ = false;   ///< in this step; narrow: a stiffer barrier has opened no gap
+  bool stiffened_ = false;                                          ///< The barrier was made stiffer in this step.
+  bool narrow_ = false;   ///< In this step a stiffer barrier has opened no gap.
 };
 
 }   // namespace slender

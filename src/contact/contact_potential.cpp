@@ -358,7 +358,7 @@ const std::vector<ContactRow>& ContactPotential::rows() const { return impl_->ro
 
 void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
 {
-  // The terms of friction, which follow the normal forces, stay: what slips is not carried along.
+  // The terms of friction come after the normal ones and do not change, so that nothing is dragged along.
   for (std::size_t k = 0; k < impl_->contacts.size(); ++k)
   {
     ContactTerm& term = impl_->terms[k];

@@ -100,8 +100,9 @@ bool Equations::solidsMove() const
   });
 }
 
-/// From the base, at which what gave way has come to rest: without a prediction, contact would block the motion again
-/// after a part of the gap.
+/// Puts what is prescribed, in the trial, where it is at the fraction `to`. What driven solids touch moves along with
+/// them by one step of Newton's method. Without this prediction, contact would block the solids after a part of the
+/// gap.
 void Equations::advance(double to)
 {
   if (solidsMove())

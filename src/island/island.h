@@ -41,7 +41,7 @@ public:
   StepReport step(double duration, double& first);
   /// Box of the surface of a part during the last step, see Part::surfaceBox().
   const BoundingBox& sweptBox(std::size_t part) const { return swept_[part]; }
-  /// Of the barrier about a part [N]; part of the state. 0: not chosen yet.
+  /// The stiffness of the barrier about a part [N]. It belongs to the state. 0 means that none was chosen yet.
   double stiffness(std::size_t part) const { return stiffness_[part]; }
   void setStiffness(std::size_t part, double stiffness) { stiffness_[part] = stiffness; }
   /// Gives contact the stiffness of all parts. It is no softer than `least` [N] about parts whose surfaces change.

@@ -1,5 +1,5 @@
-// A body in explicit steps, with the nodes that it carries: forces at the start, torques handed over by rods (thesis
-// 4.5.3), velocity and pose.
+// An explicit step of a body together with the nodes that it carries. Rods hand their torques over to it (thesis
+// 4.5.3).
 #include "body_part.h"
 
 #include "linalg/cholesky6.h"
@@ -101,8 +101,8 @@ void BodyPart::damp(double h, Eigen::Vector3d& momentum)
   momentum -= k * arm * whole_.velocity.linear + own * Eigen::Vector3d(end.tail<3>());
 }
 
-/// Symplectic Euler for the centre; for the rotation the momentum is advanced likewise, and the turn that belongs to it
-/// found by the midpoint rule, which keeps the energy of a tumbling body.
+/// The centre moves by symplectic Euler. The angular momentum advances in the same way. The midpoint rule finds the
+/// turn that belongs to this momentum, because it keeps the energy of a tumbling body.
 StepFailure BodyPart::predict(const Substep& substep, StepReport&)
 {
   const double h = substep.length;

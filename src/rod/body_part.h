@@ -30,7 +30,7 @@ public:
     Pose X_BG;
   };
   void carry(const Carried& carried) { carried_.push_back(carried); }
-  /// Lets a node of a chain follow the body, at r_B in its axes [m].
+  /// Tells the projection that a node of a chain is fixed to the body at the place r_B, in body axes [m].
   void weldTo(FastProjection& projection, int chain, int node, const Eigen::Vector3d& r_B) const
   {
     projection.weld(chain, node, number_, r_B - centre_);

@@ -240,8 +240,9 @@ public:
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   const std::vector<ContactTerm>& terms() const;
   const std::vector<ContactRow>& rows() const;
-  /// Changes the normal forces of terms(), which evaluate() has filled with their stiffness, to what they would become
-  /// if the solids that move as prescribed went on to these poses, to first order. Only forces that grow change.
+  /// Adds to the normal forces of terms() what they gain, to first order, when the solids that move as prescribed go
+  /// from `solids` to `solids_end`. Forces that would become smaller do not change. The last evaluate() must have
+  /// computed the stiffness of the terms.
   void pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
 
   /// Largest normal force [N] and smallest softened gap [m] of the last evaluate(); 0 and infinity without contact.
@@ -254,16 +255,16 @@ public:
   /// a smallest gap of a fifth and acts outside a twelfth to a half. It makes the barrier stiffer only where stiffen()
   /// would. Part of a simulation's state.
   double stiffness(int object) const;
-  /// The range holds until the next call. It begins no lower than ContactOptions::least_stiffness. `force`: 0 for the
-  /// least of the range.
+  /// Sets the stiffness about an object to `force` [N], or to the nearest value in the range. The range holds until the
+  /// next call, and its least value is at least ContactOptions::least_stiffness.
   void setStiffness(int object, double force, const BarrierRange& range = {});
   void setStiffness(double force);   ///< of all objects
   void adaptStiffness();
-  /// A barrier that is too soft for the forces lets gaps shrink until nothing can be resolved in them. If a gap has
-  /// shrunk below a twelfth of the gap since begin(), or is below a fiftieth, the barriers of what touches there are
-  /// made stiffer: as adaptStiffness() would where a solution has `converged`, else four- to a hundredfold. Gaps of
-  /// what lies in a narrow place do not open then: the next call takes the stiffness back, and it stays what it was
-  /// until begin(). Returns whether a barrier has changed.
+  /// Makes the barrier stiffer about objects whose smallest gap is too small to be resolved: it is below a twelfth of
+  /// options().gap and has shrunk since begin(), or it is below a fiftieth. If the last solution has `converged`, the
+  /// stiffness becomes what adaptStiffness() chooses; otherwise it grows four- to a hundredfold. In a narrow place a
+  /// stiffer barrier opens no gap. The next call finds this, takes the stiffness back, and the object keeps it until
+  /// begin(). Returns whether a barrier has changed.
   bool stiffen(bool converged);
   /// The last evaluate() was where a solution begins: stiffen() tells from there whether gaps have opened.
   void beginSolution();

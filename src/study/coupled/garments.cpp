@@ -131,7 +131,7 @@ TableMotion tableOf(const FigureMotion& motion, Part part, const Pose& carried)
   return {PoseTrajectory(times, poses)};
 }
 
-/// The garment on the figure: cotton, held by the part that carries it.
+/// A scene in which the figure wears the garment. The cloth is cotton, and the part that carries it holds its edge.
 SceneConfig sceneOf(const FigureMotion& motion, const Garment& garment)
 {
   std::ostringstream text;

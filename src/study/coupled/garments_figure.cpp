@@ -26,8 +26,8 @@ constexpr Part kCarrier[kParts] = {kRoot,      kRoot,     kChest,         kRoot,
                                    kRightKnee, kChest,    kRightShoulder, kRightElbow,   kRoot,
                                    kLeftHip,   kLeftKnee, kChest,         kLeftShoulder, kLeftElbow};
 constexpr double kLead = 0.6;          // [s]
-constexpr double kSpread = 0.85;       // of the arms from the trunk, as the clothes are put on [rad]
-constexpr double kSlightly = 0.2;      // the same while the figure walks [rad]
+constexpr double kSpread = 0.85;       // angle between arms and trunk when the motion begins [rad]
+constexpr double kSlightly = 0.2;      // this angle while the figure walks [rad]
 constexpr double kHipHeight = 0.887;   // [m]
 
 Quaterniond turnAbout(const Vector3d& axis, double angle) { return Quaterniond(Eigen::AngleAxisd(angle, axis)); }
