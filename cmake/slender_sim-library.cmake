@@ -30,7 +30,10 @@ list(APPEND slender_sim_LIBRARIES ${_slender_sim})
 get_target_property(_include_dirs Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
 list(APPEND slender_sim_INCLUDE_DIRS ${_include_dirs})
 
-# The headers of the room `node` need packages of ROS.
+# The headers of the room `node` need packages of ROS. One of them, pluginlib, looks for Python on its own and must find catkin's.
+if(PYTHON_EXECUTABLE AND NOT Python3_EXECUTABLE)
+  set(Python3_EXECUTABLE ${PYTHON_EXECUTABLE})
+endif()
 set(_missing "")
 foreach(_depend diagnostic_msgs interactive_markers rosbag roscpp sensor_msgs std_srvs tf2_ros visualization_msgs)
   find_package(${_depend} QUIET NO_MODULE)

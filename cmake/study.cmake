@@ -12,7 +12,7 @@ configure_file(${CMAKE_CURRENT_LIST_DIR}/package_scenes.cpp.in ${PROJECT_BINARY_
 # Object files, because a linker would leave out what only registers itself.
 add_library(slender_sim_studies OBJECT ${STUDY_SOURCES} ${PROJECT_BINARY_DIR}/package_scenes.cpp)
 target_include_directories(slender_sim_studies PUBLIC ${PROJECT_SOURCE_DIR}/include)
-target_link_libraries(slender_sim_studies PUBLIC slender_sim)
+target_link_libraries(slender_sim_studies PUBLIC slender_sim PRIVATE fcl)   # a check that is independent of contact
 slender_compile_together(slender_sim_studies
   <Eigen/Dense> <slender_sim/scene/reader.h> <slender_sim/scene/simulation.h> <slender_sim/study/study.h>)
 # lean tells instructions apart by the lines that they come from; repeatability runs the scenes of the package. Their

@@ -16,7 +16,7 @@ double angleBetween(const Pose& a, const Pose& b)
 
 bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap)
 {
-  if (a.driven && b.driven)
+  if (a.prescribed() && b.prescribed())
     return false;
   if (a.object == b.object)
     return surface.objects[a.object].self && !contactNeighbours(a, b, surface.objects[a.object], gap);

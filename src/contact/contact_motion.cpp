@@ -39,6 +39,8 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   RigidMotion rigid{Pose{}, Pose{}};
   for (const Candidates::OnSolid& on : candidates->onSolids())
   {
+    if (passes(on))
+      continue;
     if (on.solid != solid)
       rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
     solid = on.solid;
@@ -85,6 +87,8 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
   }
   for (const Candidates::OnSolid& on : near_.onSolids())
   {
+    if (passes(on))
+      continue;
     const ContactSegment& s = surface.segments[on.segment];
     const Pose to_solid = poses[on.solid].inverse();
     const double distance =
@@ -119,9 +123,9 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     {
       const ContactSegment &a = surface.segments[order_[p]], &b = surface.segments[order_[q]];
       const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
-      const bool counts = a.driven && b.driven   ? false
-                          : a.object == b.object ? c.self && !contactNeighbours(a, b, c, options.gap)
-                                                 : c.others && d.others;
+      const bool counts = a.prescribed() && b.prescribed() ? false
+                          : a.object == b.object           ? c.self && !contactNeighbours(a, b, c, options.gap)
+                                                           : c.others && d.others;
       if (counts && boxes_[order_[p]].overlaps(boxes_[order_[q]]))
         least = std::min(
             least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.coreRadius() - b.coreRadius());
@@ -135,7 +139,10 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     {
       if (!mayTouch(surface, s, solid))
         continue;
-      const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a)), e = to_solid * Eigen::Vector3d(x.col(s.b)) - a;
+      const Eigen::Vector3d from = to_solid * Eigen::Vector3d(x.col(s.a)), to = to_solid * Eigen::Vector3d(x.col(s.b));
+      // What is driven does not touch what is driven: a free end remains.
+      const Eigen::Vector3d a = !solid.body && s.driven == 1 ? to : from,
+                            e = !solid.body && s.driven != 0 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(to - from);
       if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)
         continue;
       for (const ConvexPiece& piece : solids[k].pieces)

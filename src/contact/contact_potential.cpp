@@ -76,6 +76,7 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
     margin_(o.gap)
 {
   sheets_.build(surface);
+  held_.build(surface);
   for (BarrierStiffness& own : stiffness)
     own.set(0.0, {options.least_stiffness, kInfinity});
   solids.resize(surface.solids.size());
@@ -105,12 +106,20 @@ void ContactPotential::Impl::setPieces(const ContactSurface& pieces)
   surface.objects = pieces.objects;
   stiffness.resize(surface.objects.size());
   sheets_.build(surface);
+  held_.build(surface);
   lagged.clear();
   contacts.clear();
   near_.clear();
   swept_.clear();
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
+}
+
+void ContactPotential::Impl::letPass(const SurfaceMotion& motion)
+{
+  check(motion.x, motion.solids);
+  check(motion.x_end, motion.solids_end);
+  held_.update(surface, solids, motion, options.gap);
 }
 
 void ContactPotential::Impl::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses) const
@@ -192,6 +201,8 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
 double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,
                                           const std::vector<Pose>& poses, bool with_stiffness)
 {
+  if (passes(on))
+    return 0.0;
   const Pose& pose = poses[on.solid];
   const ContactSegment& s = surface.segments[on.segment];
   const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
@@ -335,6 +346,12 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   for (BarrierStiffness& own : impl_->stiffness)
     own.beginStep();
   impl_->lagFriction();
+}
+
+void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids,
+                               const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
+{
+  impl_->letPass({x, x_end, solids, solids_end});
 }
 
 double ContactPotential::lagFriction() { return impl_->lagFriction(); }

@@ -9,6 +9,7 @@
 
 #include "barrier_stiffness.h"
 #include "candidates.h"
+#include "held_pieces.h"
 #include "slender_sim/contact/barrier.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "soft_gap.h"
@@ -55,6 +56,7 @@ public:
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
   double lagFriction();
   void keepSprings(const std::vector<Pose>& poses);
+  void letPass(const SurfaceMotion& motion);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
   void setPieces(const ContactSurface& pieces);
@@ -133,6 +135,11 @@ private:
     const double full = surface.segments[on.segment].radius;
     return thin_on_solids_.empty() ? full : thinned(thin_on_solids_, {on.solid, on.segment, on.piece}, full);
   }
+  bool passes(const Candidates::OnSolid& on) const { return held_.letPass(on.solid, false, on.segment); }
+  bool passes(const SheetCandidates::OnSolid& on) const
+  {
+    return on.face.driven != 0 && !surface.solids[on.solid].body && held_.letPass(on.solid, true, on.face.index);
+  }
   static std::array<int, 3> keyOf(const SheetCandidates::Pair& pair) { return {pair.edges, pair.first, pair.second}; }
   static std::array<int, 3> keyOf(const SheetCandidates::OnSolid& on)
   {
@@ -154,6 +161,7 @@ private:
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
   Candidates near_, swept_;
   SheetPieces sheets_;
+  HeldPieces held_;
   double margin_;
   std::vector<int> order_;   ///< for clearance()
   std::vector<BoundingBox> boxes_;

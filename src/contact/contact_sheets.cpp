@@ -74,6 +74,8 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
 double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
                                                const std::vector<Pose>& poses, bool with_stiffness)
 {
+  if (passes(on))
+    return 0.0;
   const Pose& pose = poses[on.solid];
   const SheetPieces::Face& face = on.face;
   const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
@@ -131,6 +133,8 @@ double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const E
   RigidMotion rigid{Pose{}, Pose{}};
   for (const SheetCandidates::OnSolid& on : candidates.sheets().onSolids())
   {
+    if (passes(on))
+      continue;
     if (on.solid != solid)
       rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
     solid = on.solid;
@@ -164,6 +168,8 @@ bool ContactPotential::Impl::thinSheetsToFit(const Eigen::Matrix3Xd& x, const st
   }
   for (const SheetCandidates::OnSolid& on : near_.sheets().onSolids())
   {
+    if (passes(on))
+      continue;
     const Pose to_solid = poses[on.solid].inverse();
     Eigen::Vector3d z[3];
     for (int k = 0; k < on.face.corners; ++k)

@@ -30,7 +30,7 @@ std::vector<Piece> piecesOf(const ContactSurface& surface, const Eigen::Matrix3X
 {
   std::vector<Piece> pieces;
   for (const ContactSegment& s : surface.segments)
-    pieces.push_back({2, s.object, {s.a, s.b, s.b}, s.radius, static_cast<unsigned char>(s.driven ? 3 : 0), {}});
+    pieces.push_back({2, s.object, {s.a, s.b, s.b}, s.radius, s.driven, {}});
   for (const ContactTriangle& t : surface.triangles)
     pieces.push_back({3, t.object, t.corner, t.half_thickness, t.driven, {}});
   for (Piece& p : pieces)

@@ -26,10 +26,10 @@ void SheetPieces::build(const ContactSurface& surface)
   for (int i = 0; i < segments; ++i)
   {
     const ContactSegment& s = surface.segments[i];
-    edges.push_back({s.a, s.b, s.object, s.radius, s.driven});
+    edges.push_back({s.a, s.b, s.object, s.radius, s.prescribed()});
     Element e{2, {s.a, s.b, s.b}, {-1, -1, -1}, {i, -1, -1}, s.object};
-    addPoint(s.a, s.object, s.radius, s.driven, e.point[0]);
-    addPoint(s.b, s.object, s.radius, s.driven, e.point[1]);
+    addPoint(s.a, s.object, s.radius, (s.driven & 1) != 0, e.point[0]);
+    addPoint(s.b, s.object, s.radius, (s.driven & 2) != 0, e.point[1]);
     elements.push_back(e);
   }
   const std::size_t first = points.size();
@@ -55,7 +55,7 @@ void SheetPieces::addPoint(int point, int object, double radius, bool driven, in
   {
     Point& p = points[static_cast<std::size_t>(known)];
     p.radius = std::max(p.radius, radius);
-    p.driven = p.driven || driven;   // a segment is driven if both of its ends are
+    p.driven = p.driven || driven;
     return;
   }
   known = number = static_cast<int>(points.size());
@@ -89,7 +89,8 @@ void SheetPieces::findEdges(const ContactSurface& surface)
   }
 }
 
-/// A triangle without driven corners is a face. So is an edge, or a corner, that moves freely and is not part of one.
+/// A triangle that moves freely with at least one corner is a face. So is an edge, or a corner, that moves freely and
+/// is not part of a triangle without driven corners: it remains where solids pass through the triangle.
 void SheetPieces::findFaces(const ContactSurface& surface)
 {
   covered_.assign(static_cast<std::size_t>(surface.points), 0);
@@ -119,8 +120,8 @@ void SheetPieces::findFaces(const ContactSurface& surface)
   for (int i = 0; i < triangles; ++i)
   {
     const ContactTriangle& t = surface.triangles[i];
-    whole.push_back({3, i, t.corner, t.half_thickness, t.object});
-    if (t.driven == 0)
+    whole.push_back({3, i, t.corner, t.half_thickness, t.object, t.driven});
+    if (t.driven != 7)
       faces.push_back(whole.back());
   }
 }

@@ -31,7 +31,7 @@ struct SheetPieces
     std::array<int, 3> point, edge;   ///< numbers of points and edges that it owns; -1: another element does
     int object;
   };
-  /// The free part of a triangle, by which it touches solids that move as prescribed.
+  /// A triangle, or a free edge or corner, as it touches solids.
   struct Face
   {
     int corners;                 ///< 1: a point; 2: an edge; 3: the whole triangle
@@ -39,6 +39,7 @@ struct SheetPieces
     std::array<int, 3> corner;   ///< points; -1: unused
     double radius;               ///< [m]
     int object;
+    unsigned char driven = 0;   ///< bits of the corners that move as prescribed
   };
 
   void build(const ContactSurface& surface);
@@ -51,7 +52,7 @@ struct SheetPieces
   std::vector<Point> points;
   std::vector<Edge> edges;         ///< first those that are segments, with the same numbers
   std::vector<Element> elements;   ///< segments, then triangles
-  std::vector<Face> faces;         ///< What touches solids that move as prescribed: in order of corners and index.
+  std::vector<Face> faces;         ///< What may touch solids that move as prescribed: in order of corners and index.
   std::vector<Face> whole;         ///< What touches bodies: all triangles.
   std::vector<Face> corners;       ///< All corners of triangles that are not driven: what touches planes.
 

@@ -51,7 +51,7 @@ inline bool passesThrough(const ContactSurface& surface, int object, const int* 
 inline bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
 {
   const int points[2] = {segment.a, segment.b};
-  return !segment.driven && mayTouch(surface, segment.object, solid) &&
+  return !segment.prescribed() && mayTouch(surface, segment.object, solid) &&
          !passesThrough(surface, segment.object, points, 2, solid);
 }
 

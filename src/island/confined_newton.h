@@ -63,7 +63,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   quick.tolerance = std::max(newton.tolerance, 0.5 * gap);
   quick.max_iterations = 3;
   const double way = to - from;
-  const bool pushes = system.pushes();
+  const bool pushes = from < to && system.pushes();
   for (int k = 0, idle = 0;; ++k)
   {
     double reached = to;

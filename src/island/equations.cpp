@@ -162,6 +162,8 @@ NewtonResult Equations::solve(double from, double to, const NewtonConfig& newton
   if (!contact_)
     return minimize(*this, newton);
   placeSolids(to, prescribed_);
+  gather(points_end_, poses_end_);
+  contact_->letPass(points_base_, poses_base_, points_end_, poses_end_);
   return minimizeConfined(*this, from, to, newton, contact_->options().gap / tolerances.least_edge);
 }
 

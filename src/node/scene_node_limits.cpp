@@ -72,6 +72,11 @@ void SceneNode::addLimits(diagnostic_msgs::DiagnosticStatus& status) const
   else if (!lasting.empty())
     raise(diagnostic_msgs::DiagnosticStatus::WARN,
           lasting.front() + (lasting.size() > 1 ? " and " + std::to_string(lasting.size() - 1) + " more limits" : ""));
+  const std::vector<std::string>& inside = crossings_->heldInside();
+  if (!inside.empty())
+    raise(diagnostic_msgs::DiagnosticStatus::WARN, inside.front());
+  for (const std::string& pair : inside)
+    status.values.push_back(entry("held inside", pair));
   status.values.push_back(entry("limits exceeded now", std::to_string(lasting.size())));
   status.values.push_back(entry("limits exceeded so far", std::to_string(limits_->count())));
   if (!lasting.empty())

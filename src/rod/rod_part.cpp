@@ -32,6 +32,7 @@ bool RodPart::numberUnknowns()
       std::equal(grasps.begin(), grasps.end(), holds_.begin(),
                  [&](const GraspState& g, const std::array<int, 4>& held) { return hold(g) == held; }))
     return true;
+  ++surface_version_;   // with other driven points
   holds_.clear();
   dof_.assign(4 * model.nodes(), 0);
   welded_ = false;

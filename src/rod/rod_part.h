@@ -73,6 +73,7 @@ private:
   double shortestEdge() const override { return shortest_edge_; }
   void addStartLoads() override;
   void takeStartAcceleration() override;
+  long surfaceVersion() const override { return surface_version_; }
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
   StepFailure finishSubstep(StepReport& report) override;
@@ -112,6 +113,7 @@ private:
   double duration_ = 1.0;
   int chain_ = -1;   ///< its number in the projection; -1: it stretches
   bool welded_ = false;
+  long surface_version_ = 0;
   bool dependent_ = false;   ///< the prescribed averages depend on each other on the free nodes
   std::vector<std::array<int, 3>> carried_entries_;   ///< node, column, row of those with a carried unknown
   std::vector<std::array<int, 4>> holds_;             ///< grasps that dof_ was made for: active, first, last, carried

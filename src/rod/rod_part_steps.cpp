@@ -74,12 +74,14 @@ void RodPart::addSurface(ContactSurface& surface) const
   if (!touches_)
     return;
   const RodModel& m = *rod_.model;
+  const auto isHeld = [this](int node) { return !dof_.empty() && dof_[4 * node] == kPrescribed; };
   double start = 0.0;
   for (int j = 0; j < m.edges(); ++j)
   {
     ContactSegment s;
     s.a = surface.points + j;
     s.b = surface.points + (j + 1) % m.nodes();
+    s.driven = static_cast<unsigned char>(isHeld(j) + 2 * isHeld((j + 1) % m.nodes()));
     s.radius = std::max(m.radius_a[j], m.radius_b[j]);
     s.object = static_cast<int>(surface.objects.size());
     s.start = start;

@@ -31,7 +31,7 @@ void ThreadPart::addSurface(ContactSurface& surface) const
     s.b = surface.points + j + 1;
     s.radius = state.radius(j);
     s.length = state.edge(j).norm();
-    s.driven = isHeld(j) && isHeld(j + 1);
+    s.driven = static_cast<unsigned char>(isHeld(j) + 2 * isHeld(j + 1));
     surface.segments.push_back(s);
     s.start += s.length;
   }

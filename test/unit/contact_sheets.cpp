@@ -193,6 +193,7 @@ TEST(ContactSheets, ForceOfSolidsIsTheGradient)
         if (!c.bring(3, n))
           continue;   // a plane that n does not leave
         ContactPotential p = c.potential();
+        p.letPass(c.x, c.solids, c.x, c.solids);   // the solid may be around held corners
         if (!(p.evaluate(c.x, c.solids, false) > 0.0))
           continue;   // at a corner, where only half the gap counts
         EXPECT_LT(gradientError(p, c.x, c.solids), kDifferences)

@@ -68,6 +68,29 @@ rods:
   EXPECT_EQ(crossingsOf(falling).size(), 1u);
 }
 
+const std::string kLowered = R"(
+time: {step: 0.005, integrator: implicit_euler}
+rods:
+  - name: rope
+    centerline: {straight: {from: [0, 0, 0.02], to: [0.1, 0, 0.02], edges: 10}}
+    cross_section: {radius: 0.002}
+    contact: {}
+    grasps: {hand: {edges: [0], motion: {table: [[0, 0, 0, 0.02, 0, 0, 0, 1], [0.1, 0, 0, -0.02, 0, 0, 0, 1]]}}}
+obstacles:
+  - {name: table, shape: {box: {size: [1, 1, 0.2]}}, pose: {position: [0, 0, -0.1]}}
+)";
+
+TEST(CrossingWatch, NamesWhatIsHeldInsideOfAnObstacle)
+{
+  const std::vector<std::string> found = crossingsOf(kLowered);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].rfind("rod 'rope' is held inside obstacle 'table', node 0 at (0, 0, 0", 0), 0u) << found[0];
+  EXPECT_NE(found[0].find("(t = 0.0"), std::string::npos) << found[0];
+  std::string passing = kLowered;
+  passing.replace(passing.find("edges: [0],"), 11, "edges: [0], contact: {ignore: [table]},");
+  EXPECT_TRUE(crossingsOf(passing).empty());
+}
+
 TEST(CrossingWatch, IsSilentAboutWhatIsMeant)
 {
   EXPECT_TRUE(crossingsOf(fallingPast(kStringAcross + "    contact: {}\n")).empty());

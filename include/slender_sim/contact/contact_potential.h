@@ -25,9 +25,12 @@ struct ContactSegment
   double start = 0.0;    ///< arc length of a along the object's curve [m]; b is at start + length
   double length = 0.0;   ///< at rest [m]
   double core = 1.0;     ///< share of the radius that other segments may not enter (fluid parts merge down to it)
-  bool driven = false;   ///< moves as prescribed: passes through what does so, too, solids included
+  /// Bit 0: a moves as prescribed; bit 1: b. A segment of which both do passes through what does so, too, solids
+  /// included.
+  unsigned char driven = 0;
 
   double coreRadius() const { return core * radius; }
+  bool prescribed() const { return driven == 3; }
 };
 
 /// A triangle of a cloth. Its edges and corners are derived from all triangles that have them in common.
@@ -38,8 +41,8 @@ struct ContactTriangle
   /// surface keeps half the thickness from a solid.
   double half_thickness = 0.0;
   int object = 0;
-  /// Bit k: corner k moves as prescribed. Pieces of which all corners do so pass through each other. Of a triangle only
-  /// the corners that move freely, and the edge between two of them, touch solids that move as prescribed.
+  /// Bit k: corner k moves as prescribed. Pieces of which all corners do so pass through each other, and through solids
+  /// that move as prescribed.
   unsigned char driven = 0;
 };
 
@@ -181,7 +184,7 @@ private:
 /// iterates of a minimisation never get to either. Memory is reused from step to step.
 ///
 /// The pairs are: two edges (segments, and edges of triangles), a point and a triangle (corners, and ends of segments),
-/// a segment and a solid, and a triangle (or its free edge or corner) and a solid. All of them have energies that are
+/// a segment and a solid, and a triangle (or a free edge or corner) and a solid. All of them have energies that are
 /// once continuously differentiable, see soft_gap.h and pair_gap.h.
 class ContactPotential
 {
@@ -207,14 +210,21 @@ public:
   const std::vector<GridPairs::Pair>& nearPairs() const;
 
   /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less:
-  /// they meet. Triangles that an edge passes through meet it. Shares no search structure and no minimisation with the
-  /// rest of this class. The surface of a mesh is touched from both sides.
+  /// they meet. Triangles that an edge passes through meet it. Of pieces with held points only the free corners, and
+  /// the edges between them, keep a distance from solids that move as prescribed. Shares no search structure and no
+  /// minimisation with the rest of this class. The surface of a mesh is touched from both sides.
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
 
   /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
   /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from
   /// earlier steps but stiffness() and springs().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
+  /// In the next solution what is prescribed goes from (x, solids) to (x_end, solids_end). Where a solid that moves as
+  /// prescribed comes nearer to held points than the gap, nothing could give way. There it passes through the pieces at
+  /// these points, and only their free corners, and the edges between these, touch it, until the pieces are apart from
+  /// it and their held points out of its reach.
+  void letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, const Eigen::Matrix3Xd& x_end,
+               const std::vector<Pose>& solids_end);
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
   /// of a contact's force over the largest force.
   double lagFriction();

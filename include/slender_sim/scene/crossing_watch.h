@@ -12,6 +12,9 @@ namespace slender {
 /// Notices rods, threads and cloths without contact that pass through rods, threads, cloths with contact or through
 /// simulated bodies. Bodies that are welded to a rod may be inside it. Of a cloth only the edges are
 /// checked. Pairs of cloths are not checked, because guides may pass through the cloths that follow them.
+///
+/// Notices rods and cloths with contact as well that are held inside obstacles or driven bodies. Nothing can move these
+/// apart, so that held points pass through them, unlike the free ones.
 class CrossingWatch
 {
 public:
@@ -20,6 +23,9 @@ public:
 
   /// Looks at the present state. Call it after a step. Returns a text for each pair that was not found before.
   std::vector<std::string> check();
+  /// The pairs at the last check() of which one is held inside the other: "rod 'rope' is held inside obstacle 'table',
+  /// node 0 at (0.1, 0, -0.02) m".
+  const std::vector<std::string>& heldInside() const { return held_inside_; }
 
 private:
   enum class Kind
@@ -46,12 +52,26 @@ private:
     double radius = 0.0;
   };
 
+  /// An obstacle or a driven body, and an object that is held, with its contact.
+  struct HeldPair
+  {
+    int object, obstacle, body;   ///< the obstacle or the body is -1
+    double reach;                 ///< distance from points of the object within which surfaces touch [m]
+    const std::vector<IgnoredSolid>* ignored;
+    bool told = false;
+  };
+
   Pieces piecesOf(const Object& object) const;
+  void pairHeld(Kind kind, int index, double reach, const std::vector<IgnoredSolid>& ignored);
+  void checkHeld(std::vector<std::string>& found);
+  std::vector<int> heldPoints(const Object& object) const;
   bool meets(const Pieces& pieces, const Object& other) const;
 
   const Simulation& simulation_;
   std::vector<Object> objects_;
   std::vector<Pair> pairs_;   ///< that were not found so far
+  std::vector<HeldPair> held_;
+  std::vector<std::string> held_inside_;
 };
 
 }   // namespace slender

@@ -12,6 +12,13 @@ namespace {
 
 constexpr std::uint64_t kBetweenCurves = 4;   // steps; bodies may be fast, and are looked at in each step
 
+std::string timeOf(const Simulation& simulation)
+{
+  char text[60];
+  std::snprintf(text, sizeof text, " (t = %.6g s)", simulation.state().time);
+  return text;
+}
+
 bool welds(const BodyConfig& body, int rod)
 {
   return std::any_of(body.welds.begin(), body.welds.end(), [rod](const WeldConfig& weld) { return weld.rod == rod; });
@@ -47,6 +54,35 @@ CrossingWatch::CrossingWatch(const Simulation& simulation) : simulation_(simulat
       if (!cloths &&
           !(first.kind == Kind::rod && second.kind == Kind::body && welds(scene.bodies[second.index], first.index)))
         pairs_.push_back({a, b});
+    }
+  const WorldModel& model = simulation.world().model();
+  for (std::size_t r = 0; r < model.rods.size(); ++r)
+    if (const WorldModel::Rod& rod = model.rods[r]; rod.contact)
+      pairHeld(Kind::rod, static_cast<int>(r), std::max(rod.model->radius_a.maxCoeff(), rod.model->radius_b.maxCoeff()),
+               rod.ignored);
+  for (std::size_t c = 0; c < model.cloths.size(); ++c)
+    if (const WorldModel::Cloth& cloth = model.cloths[c]; cloth.contact)
+      pairHeld(Kind::cloth, static_cast<int>(c), 0.5 * cloth.contact->thickness, cloth.ignored);
+}
+
+void CrossingWatch::pairHeld(Kind kind, int index, double reach, const std::vector<IgnoredSolid>& ignored)
+{
+  const SceneConfig& scene = simulation_.config();
+  const auto object = std::find_if(objects_.begin(), objects_.end(),
+                                   [&](const Object& o) { return o.kind == kind && o.index == index; });
+  HeldPair pair{static_cast<int>(object - objects_.begin()), -1, -1, reach, &ignored};
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
+  {
+    pair.obstacle = static_cast<int>(k);
+    held_.push_back(pair);
+  }
+  pair.obstacle = -1;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+    if (const BodyConfig& body = scene.bodies[b];
+        body.motion && body.shape && body.contact && !(kind == Kind::rod && welds(body, index)))
+    {
+      pair.body = static_cast<int>(b);
+      held_.push_back(pair);
     }
 }
 
@@ -123,13 +159,61 @@ std::vector<std::string> CrossingWatch::check()
       ++pair;
       continue;
     }
-    char time[40];
-    std::snprintf(time, sizeof time, "%.6g", simulation_.state().time);
-    found.push_back(without.name + " has no contact and passes through " + other.name + " (t = " + time +
-                    " s); give it the key contact if they shall touch");
+    found.push_back(without.name + " has no contact and passes through " + other.name + timeOf(simulation_) +
+                    "; give it the key contact if they shall touch");
     pair = pairs_.erase(pair);
   }
+  checkHeld(found);
   return found;
+}
+
+/// Points that grasps hold at prescribed places, by number.
+std::vector<int> CrossingWatch::heldPoints(const Object& object) const
+{
+  if (object.kind == Kind::cloth)
+    return simulation_.state().cloths[object.index].pins;
+  std::vector<int> points;
+  for (const GraspState& grasp : simulation_.state().rods[object.index].grasps)
+    for (int i = grasp.first_node; grasp.active && grasp.body < 0 && i <= grasp.last_node; ++i)
+      points.push_back(i);
+  return points;
+}
+
+void CrossingWatch::checkHeld(std::vector<std::string>& found)
+{
+  held_inside_.clear();
+  const WorldState& state = simulation_.state();
+  for (HeldPair& pair : held_)
+  {
+    const Object& object = objects_[pair.object];
+    const auto& bodies = simulation_.world().model().bodies;
+    const Shape& shape = pair.body < 0 ? simulation_.config().obstacles[pair.obstacle].shape : *bodies[pair.body].shape;
+    const Pose pose =
+        pair.body < 0 ? state.obstacles[pair.obstacle] : state.bodies[pair.body].X_WB * bodies[pair.body].X_BS;
+    const Eigen::Matrix3Xd& x = object.kind == Kind::cloth ? state.cloths[object.index].x : state.rods[object.index].x;
+    const double reach = boundingRadius(shape) + pair.reach;
+    for (const int i : heldPoints(object))
+    {
+      const bool ignored = std::any_of(pair.ignored->begin(), pair.ignored->end(), [&](const IgnoredSolid& solid) {
+        return solid.number == pair.obstacle &&
+               (solid.points.empty() || solid.points[static_cast<std::size_t>(i)] != 0);
+      });
+      if (ignored || (x.col(i) - pose.position).norm() > reach ||
+          distanceToShape(shape, pose, x.col(i), x.col(i)) >= pair.reach)
+        continue;
+      char place[120];
+      std::snprintf(place, sizeof place, ", %s %d at (%.4g, %.4g, %.4g) m",
+                    object.kind == Kind::cloth ? "vertex" : "node", i, x(0, i), x(1, i), x(2, i));
+      held_inside_.push_back(object.name + " is held inside " +
+                             (pair.body < 0 ? "obstacle '" + simulation_.config().obstacles[pair.obstacle].name
+                                            : "body '" + simulation_.config().bodies[pair.body].name) +
+                             "'" + place);
+      if (!pair.told)
+        found.push_back(held_inside_.back() + timeOf(simulation_) + "; held points pass through it, free ones do not");
+      pair.told = true;
+      break;
+    }
+  }
 }
 
 }   // namespace slender

@@ -102,7 +102,7 @@ const HeadlineRegistration kCoupled{{
      "Finer clothes can be worn nearly in real time.",
      Bar::Form::full},
     {"coupled_safety",
-     "penetrations in random scenes of rods, cloths, bodies and obstacles at up to 20 m/s",
+     "penetrations in random scenes of all kinds of objects at up to 20 m/s",
      {{"penetrations"}},
      kCount,
      "a check of all pairs after each step",

@@ -7,6 +7,8 @@
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/contact/intersection.h"
+#include "slender_sim/contact/solids.h"
+#include "solid_overlap.h"
 
 namespace slender::study {
 
@@ -39,6 +41,12 @@ double pointBox(const Box& box, const Vector3d& p)
   return out.maxCoeff() > 0.0 ? out.cwiseMax(0.0).norm() : out.maxCoeff();
 }
 
+double pointCylinder(const Cylinder& cylinder, const Vector3d& p)
+{
+  const double side = p.head<2>().norm() - cylinder.radius, end = std::abs(p.z()) - 0.5 * cylinder.length;
+  return std::max(side, end) > 0.0 ? std::hypot(std::max(side, 0.0), std::max(end, 0.0)) : std::max(side, end);
+}
+
 /// Minimum of a convex function over [0, 1].
 template <class F>
 double leastAlong(const F& f)
@@ -62,25 +70,26 @@ double shapeDistance(const Shape& shape, const Vector3d (&v)[3])
   if (const auto* capsule = std::get_if<Capsule>(&shape))
     return segmentTriangle({0, 0, -0.5 * capsule->length}, {0, 0, 0.5 * capsule->length}, v[0], v[1], v[2]) -
            capsule->radius;
-  const Box& box = std::get<Box>(shape);
-  return leastAlong([&](double s) {
-    return leastAlong(
-        [&](double t) { return pointBox(box, v[0] + s * ((1.0 - t) * (v[1] - v[0]) + t * (v[2] - v[0]))); });
-  });
-}
-
-/// Solid angle of a mesh seen from a point [sr] [Van Oosterom & Strackee 1983]. Where the mesh passes through the point
-/// it jumps by 4 pi.
-double solidAngle(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xi& triangles, const Vector3d& p)
-{
-  double sum = 0.0;
-  for (Eigen::Index t = 0; t < triangles.cols(); ++t)
+  if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&shape))
   {
-    const Vector3d a = x.col(triangles(0, t)) - p, b = x.col(triangles(1, t)) - p, c = x.col(triangles(2, t)) - p;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    sum += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+    double least = isInsideMesh(**mesh, v[0]) ? -1.0 : kInfinity;
+    for (Eigen::Index i = 0; i < (*mesh)->triangles.cols(); ++i)
+    {
+      const Vector3d face[3] = {(*mesh)->vertices.col((*mesh)->triangles(0, i)),
+                                (*mesh)->vertices.col((*mesh)->triangles(1, i)),
+                                (*mesh)->vertices.col((*mesh)->triangles(2, i))};
+      least = std::min(
+          least, v[1] == v[2] ? segmentTriangle(v[0], v[1], face[0], face[1], face[2]) : triangleTriangle(v, face));
+    }
+    return least;
   }
-  return sum;
+  const auto* cylinder = std::get_if<Cylinder>(&shape);
+  const auto distance = [&](const Vector3d& p) {
+    return cylinder ? pointCylinder(*cylinder, p) : pointBox(std::get<Box>(shape), p);
+  };
+  return leastAlong([&](double s) {
+    return leastAlong([&](double t) { return distance(v[0] + s * ((1.0 - t) * (v[1] - v[0]) + t * (v[2] - v[0]))); });
+  });
 }
 
 /// Gauss's linking integral of two open polylines, exact segment by segment [Klenin & Langowski 2000]. Where they pass
@@ -116,13 +125,21 @@ MixedCheck::MixedCheck(const Simulation& scene, Faces against_solids)
   for (std::size_t r = 0; r < config.rods.size(); ++r)
   {
     const RodModel& model = scene.rodModel(static_cast<int>(r));
+    std::vector<char> held(static_cast<std::size_t>(model.nodes()), 0);
+    for (const GraspState& grasp : scene.state().rods[r].grasps)
+      for (int i = grasp.first_node; grasp.active && i <= grasp.last_node; ++i)
+        held[i] = against_solids == Faces::without_held_corners;
     double along = 0.0;
     for (int e = 0; e < model.edges(); ++e)
     {
-      tubes_.push_back({static_cast<int>(r), e, (e + 1) % model.nodes(), std::max(model.radius_a[e], model.radius_b[e]),
-                        along, model.rest_length[e]});
+      const double radius = std::max(model.radius_a[e], model.radius_b[e]);
+      tubes_.push_back({static_cast<int>(r), e, (e + 1) % model.nodes(), radius, radius, along, model.rest_length[e],
+                        !held[e] && !held[(e + 1) % model.nodes()]});
       along += model.rest_length[e];
     }
+    curves_.emplace_back();
+    curves_.back().closed = model.closed;
+    curves_.back().curve_length = along;
     names_.push_back("rod " + model.name);
     rest_.emplace_back();
   }
@@ -140,6 +157,7 @@ MixedCheck::MixedCheck(const Simulation& scene, Faces against_solids)
                         0.5 * config.cloths[c].contact->thickness,
                         against_solids == Faces::all || !held});
     }
+    curves_.emplace_back();
     names_.push_back("cloth " + model.name);
     rest_.push_back(model.rest.vertices);
   }
@@ -147,6 +165,9 @@ MixedCheck::MixedCheck(const Simulation& scene, Faces against_solids)
     solids_.push_back({"obstacle " + obstacle.name, obstacle.shape, {}, false});
   for (const BodyConfig& body : config.bodies)
     solids_.push_back({"body " + body.name, *body.shape, {}, !body.motion});
+  rods_ = config.rods.size();
+  objects_ = names_.size();
+  rod_tubes_ = tubes_.size();
   take(scene);
   MixedFindings ignored;
   checkSides(ignored);
@@ -159,11 +180,39 @@ void MixedCheck::take(const Simulation& scene)
     x_.push_back(rod.x);
   for (const ClothState& cloth : scene.state().cloths)
     x_.push_back(cloth.x);
+  takeThreads(scene);
   const std::size_t obstacles = scene.config().obstacles.size();
   for (std::size_t k = 0; k < solids_.size(); ++k)
     solids_[k].pose = k < obstacles
                           ? scene.state().obstacles[k]
                           : scene.state().bodies[k - obstacles].X_WB * scene.config().bodies[k - obstacles].X_BS;
+}
+
+/// Radii change when a step ends, with the lengths of the edges, so that a share of them must do.
+void MixedCheck::takeThreads(const Simulation& scene)
+{
+  constexpr double kFirm = 0.5;
+  names_.resize(objects_);
+  curves_.resize(objects_);
+  tubes_.resize(rod_tubes_);
+  for (std::size_t k = 0; k < scene.state().threads.size(); ++k)
+    for (const ThreadState& thread : scene.state().threads[k].threads)
+    {
+      const int object = static_cast<int>(names_.size());
+      curves_.emplace_back();
+      names_.push_back("thread " + scene.config().threads[k].name);
+      x_.emplace_back(3, thread.nodes());
+      for (int i = 0; i < thread.nodes(); ++i)
+        x_.back().col(i) = thread.x[i];
+      double along = 0.0;
+      for (int e = 0; e < thread.edges(); ++e)
+      {
+        const double length = thread.edge(e).norm();
+        const bool held = (e == 0 && thread.ends[0].held) || (e + 1 == thread.edges() && thread.ends[1].held);
+        tubes_.push_back({object, e, e + 1, kFirm * thread.radius(e), thread.radius(e), along, length, !held});
+        along += length;
+      }
+    }
 }
 
 MixedFindings MixedCheck::check(const Simulation& scene)
@@ -174,6 +223,7 @@ MixedFindings MixedCheck::check(const Simulation& scene)
   checkTubes(out);
   checkFaces(out);
   checkSolids(out);
+  checkSolidPairs(out);
   checkSides(out);
   return out;
 }
@@ -190,13 +240,12 @@ void MixedCheck::note(double room, const std::string& a, const std::string& b, M
 
 void MixedCheck::checkTubes(MixedFindings& out) const
 {
-  const ContactObject curve;
   for (std::size_t i = 0; i < tubes_.size(); ++i)
     for (std::size_t j = i + 1; j < tubes_.size(); ++j)
     {
       const Tube &s = tubes_[i], &t = tubes_[j];
-      if (s.object == t.object && contactNeighbours({0, 0, s.radius, 0, s.start, s.length},
-                                                    {0, 0, t.radius, 0, t.start, t.length}, curve, gap_))
+      if (s.object == t.object && contactNeighbours({0, 0, s.whole, 0, s.start, s.length},
+                                                    {0, 0, t.whole, 0, t.start, t.length}, curves_[s.object], gap_))
         continue;
       const Eigen::Matrix3Xd &x = x_[s.object], &y = x_[t.object];
       const double reach = s.radius + t.radius + 0.51 * (s.length + t.length) + 1e-2;
@@ -264,32 +313,39 @@ void MixedCheck::checkFaces(MixedFindings& out) const
 
 void MixedCheck::checkSolids(MixedFindings& out) const
 {
-  for (std::size_t k = 0; k < solids_.size(); ++k)
+  constexpr double kFar = 0.01;   // [m] of room: pieces with more are not measured
+  for (const Solid& solid : solids_)
   {
-    const Solid& solid = solids_[k];
     const Pose inverse = solid.pose.inverse();
+    const double reach = boundingRadius(solid.shape) + kFar;
+    const auto look = [&](int object, const int(&corner)[3], double thickness, bool free) {
+      if (!solid.simulated && !free)
+        return;
+      Vector3d v[3];
+      for (int k = 0; k < 3; ++k)
+        v[k] = inverse * Vector3d(x_[object].col(corner[k]));
+      if (pointTriangleDistance(Vector3d::Zero(), v[0], v[1], v[2]) < reach + thickness)
+        note(shapeDistance(solid.shape, v) - thickness, names_[object], solid.name, out);
+    };
     for (const Tube& t : tubes_)
-    {
-      const Vector3d v[3] = {inverse * Vector3d(x_[t.object].col(t.a)), inverse * Vector3d(x_[t.object].col(t.b)),
-                             inverse * Vector3d(x_[t.object].col(t.b))};
-      note(shapeDistance(solid.shape, v) - t.radius, names_[t.object], solid.name, out);
-    }
+      look(t.object, {t.a, t.b, t.b}, t.radius, t.free);
     for (const Face& f : faces_)
-    {
-      if (!f.against_solids)
-        continue;
-      const Eigen::Matrix3Xd& x = x_[f.object];
-      const Vector3d v[3] = {inverse * Vector3d(x.col(f.corner[0])), inverse * Vector3d(x.col(f.corner[1])),
-                             inverse * Vector3d(x.col(f.corner[2]))};
-      note(shapeDistance(solid.shape, v) - f.half_thickness, names_[f.object], solid.name, out);
-    }
-    for (std::size_t j = 0; j < solids_.size(); ++j)   // spheres against all
-      if (const auto* ball = std::get_if<Sphere>(&solids_[j].shape); ball && j != k && solids_[j].simulated)
-      {
-        const Vector3d c = inverse * solids_[j].pose.position, v[3] = {c, c, c};
-        note(shapeDistance(solid.shape, v) - ball->radius, solids_[j].name, solid.name, out);
-      }
+      look(f.object, f.corner, f.half_thickness, f.free);
   }
+}
+
+void MixedCheck::checkSolidPairs(MixedFindings& out) const
+{
+  for (std::size_t i = 0; i < solids_.size(); ++i)
+    for (std::size_t j = i + 1; j < solids_.size(); ++j)
+    {
+      const Solid &a = solids_[i], &b = solids_[j];
+      if ((!a.simulated && !b.simulated) || !overlap(a.shape, a.pose, b.shape, b.pose))
+        continue;
+      ++out.penetrations;
+      if (out.first.empty())
+        out.first = a.name + " and " + b.name + " overlap";
+    }
 }
 
 /// Rods on the other side of a cloth or of a rod than before, and balls on the other side of a cloth: the solid angle
@@ -298,15 +354,13 @@ void MixedCheck::checkSides(MixedFindings& out)
 {
   std::vector<std::vector<double>> now;
   std::vector<std::string> pairs;
-  const std::size_t rods = names_.size() - static_cast<std::size_t>(std::count_if(
-                                               rest_.begin(), rest_.end(), [](const auto& r) { return r.cols() > 0; }));
-  for (std::size_t i = 0; i < rods; ++i)
-    for (std::size_t j = i + 1; j < rods; ++j)
+  for (std::size_t i = 0; i < rods_; ++i)
+    for (std::size_t j = i + 1; j < rods_; ++j)
     {
       now.push_back({4.0 * linkingIntegral(x_[i], x_[j])});   // large: 1, of at most 2
       pairs.push_back(names_[i] + " and " + names_[j]);
     }
-  for (std::size_t c = rods; c < names_.size(); ++c)
+  for (std::size_t c = rods_; c < objects_; ++c)
   {
     Eigen::Matrix3Xi triangles(3, 0);
     for (const Face& f : faces_)
@@ -321,7 +375,7 @@ void MixedCheck::checkSides(MixedFindings& out)
         now.back().push_back(solidAngle(x_[c], triangles, points.col(i)) / M_PI);   // large: 1, of at most 2
       pairs.push_back(name + " and " + names_[c]);
     };
-    for (std::size_t i = 0; i < rods; ++i)
+    for (std::size_t i = 0; i < rods_; ++i)
       add(x_[i], names_[i]);
     for (const Solid& solid : solids_)
       if (solid.simulated)

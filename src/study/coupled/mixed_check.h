@@ -17,13 +17,13 @@ struct MixedFindings
   std::string first;              ///< names of the first pair that is wrong
 };
 
-/// Checks a scene of rods with round sections, cloths, simulated bodies and obstacles (spheres, capsules, boxes,
-/// planes) after each step.
+/// Checks a scene of rods with round sections, threads, cloths, simulated bodies and obstacles of all shapes after each
+/// step: all pairs but those of two solids that move as prescribed.
 class MixedCheck
 {
 public:
-  /// Which faces of cloths are checked against solids. Solids that move as prescribed pass through those corners and
-  /// edges of faces that are held (contact_potential.h).
+  /// Which faces of cloths, and segments of rods, are checked against solids that move as prescribed. These pass
+  /// through pieces with held corners where they press on them (ContactPotential::letPass()).
   enum class Faces
   {
     all,
@@ -38,16 +38,16 @@ private:
   struct Tube
   {
     int object, a, b;
-    double radius, start, length;   ///< [m]; along the rod
+    double radius, whole, start, length;   ///< [m]: that others keep out of; of the tube; along the rod
+    bool free;                             ///< checked against solids that move as prescribed
   };
   struct Face
   {
     int object;
     int corner[3];
     double half_thickness;   ///< [m]
-    bool against_solids;
+    bool free;               ///< checked against solids that move as prescribed
   };
-  /// A solid shape, or the rounded surface of a body.
   struct Solid
   {
     std::string name;
@@ -57,6 +57,8 @@ private:
   };
 
   void take(const Simulation& scene);
+  void takeThreads(const Simulation& scene);
+  void checkSolidPairs(MixedFindings& out) const;
   void checkTubes(MixedFindings& out) const;
   void checkFaces(MixedFindings& out) const;
   void checkSolids(MixedFindings& out) const;
@@ -65,10 +67,12 @@ private:
   double restScale(const Face& f, const Face& g) const;
 
   double gap_ = 0.0;
-  std::vector<std::string> names_;       ///< of rods, then of cloths
-  std::vector<Eigen::Matrix3Xd> x_;      ///< likewise
-  std::vector<Eigen::Matrix3Xd> rest_;   ///< likewise; of rods empty
-  std::vector<Tube> tubes_;
+  std::vector<std::string> names_;                       ///< of rods, then of cloths, then of pieces of threads
+  std::vector<ContactObject> curves_;                    ///< likewise
+  std::vector<Eigen::Matrix3Xd> x_;                      ///< likewise
+  std::vector<Eigen::Matrix3Xd> rest_;                   ///< likewise; of rods empty
+  std::vector<Tube> tubes_;                              ///< of rods, then of threads
+  std::size_t rods_ = 0, objects_ = 0, rod_tubes_ = 0;   ///< objects: rods and cloths
   std::vector<Face> faces_;
   std::vector<Solid> solids_;
   std::vector<std::vector<double>> sides_;   ///< of the step before, see checkSides()
