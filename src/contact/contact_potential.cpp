@@ -314,8 +314,6 @@ ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions&
 ContactPotential::~ContactPotential() = default;
 ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
 const ContactOptions& ContactPotential::options() const { return impl_->options; }
-const ContactSolid& ContactPotential::solid(std::size_t number) const { return impl_->surface.solids[number]; }
-
 void ContactPotential::setPieces(const ContactSurface& surface) { impl_->setPieces(surface); }
 
 void ContactPotential::setRanges(std::size_t solid, const std::vector<std::pair<int, double>>& ranges)
@@ -328,7 +326,7 @@ bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Po
   return impl_->thinToFit(x, solids);
 }
 
-const std::vector<ContactSegment>& ContactPotential::segments() const { return impl_->surface.segments; }
+const ContactSurface& ContactPotential::surface() const { return impl_->surface; }
 const std::vector<GridPairs::Pair>& ContactPotential::nearPairs() const { return impl_->nearPairs(); }
 
 double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)

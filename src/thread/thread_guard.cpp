@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/soft_gap.h"
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/distance.h"
 
@@ -28,7 +29,22 @@ bool ThreadGuard::allows(const ThreadState& state, int first, int last, const Ei
     };
     return side(a) && side(b);
   };
-  return forOthers(state, first, last, isFree);
+  const auto isOutside = [&](const ConvexPiece& piece, const Pose& pose, double reach, double r) {
+    if ((pose.position - from).norm() > reach + radius + r + gap_ + 2.0 * std::max(reach_a, reach_b))
+      return true;
+    const RigidMotion rest(pose, pose);
+    const Pose to_piece = pose.inverse();
+    const auto side = [&](const MovingPoint& end) {
+      ApproachLimit limit;
+      limit.thickness =
+          std::min(radius + r, 0.99 * segmentPieceDistance(piece, to_piece * end.from, to_piece * node.from).distance);
+      limit.reach = gap_;
+      return segmentSolidLimit(end, node, piece, rest, limit) >= 1.0;
+    };
+    return side(a) && side(b);
+  };
+  const Strand* strand = strandOf(state);
+  return !strand || (forOthers(state, first, last, isFree) && forFaces(strand->contact, isOutside));
 }
 
 bool ThreadGuard::mayJoin(const ThreadState& state, int i) const
@@ -43,16 +59,79 @@ bool ThreadGuard::mayJoin(const ThreadState& state, int i) const
   });
 }
 
-template <class F>
-bool ThreadGuard::forTubes(F&& f) const
+const ThreadGuard::Strand* ThreadGuard::strandOf(const ThreadState& state) const
 {
-  for (const Tube& tube : tubes_)
-    for (Eigen::Index j = 0; j < tube.radius.size(); ++j)
-    {
-      const int a = static_cast<int>(j), b = (a + 1) % tube.chain->nodes();
-      if (!f(tube.chain->position(a), tube.chain->position(b), tube.radius[j], 1.0))
-        return false;
-    }
+  const auto at = std::find_if(strands_.begin(), strands_.end(), [&](const Strand& s) { return s.state == &state; });
+  return at == strands_.end() ? nullptr : &*at;
+}
+
+template <class F>
+bool ThreadGuard::forRods(F&& f) const
+{
+  const ContactPotential* contact = equations_ ? equations_->contact() : nullptr;
+  if (!contact)
+    return true;
+  const ContactSurface& surface = contact->surface();
+  const Eigen::Matrix3Xd& x = equations_->startPoints();
+  for (const ContactSegment& s : surface.segments)
+    if (const ContactObject& object = surface.objects[s.object];
+        object.owner < 0 && object.others && !f(x.col(s.a), x.col(s.b), s.radius, 1.0))
+      return false;
+  return true;
+}
+
+template <class F>
+bool ThreadGuard::forFaces(const ContactProperties& own, F&& f) const
+{
+  const ContactPotential* contact = equations_ ? equations_->contact() : nullptr;
+  if (!contact)
+    return true;
+  const ContactSurface& surface = contact->surface();
+  const Eigen::Matrix3Xd& x = equations_->startPoints();
+  for (const ContactTriangle& t : surface.triangles)
+  {
+    if (!own.others || !surface.objects[t.object].others)
+      continue;
+    const Pose corner{x.col(t.corner[0]), Eigen::Quaterniond::Identity()};
+    const Triangle face{Eigen::Vector3d::Zero(), x.col(t.corner[1]) - corner.position,
+                        x.col(t.corner[2]) - corner.position};
+    if (!f(face, corner, std::max(face[1].norm(), face[2].norm()), t.half_thickness))
+      return false;
+  }
+  return !own.solids || forSolids(f);
+}
+
+template <class F>
+bool ThreadGuard::forSolids(F&& f) const
+{
+  const std::vector<ContactSolid>& solids = equations_->contact()->surface().solids;
+  for (std::size_t k = 0; k < solids.size(); ++k)
+  {
+    if (solids[k].only >= 0)   // the floor of a thread: flat, so that its mesh stays above
+      continue;
+    const Pose& pose = equations_->startSolids()[k];
+    const double reach = boundingRadius(solids[k].shape);
+    const bool passed = std::visit(
+        [&](const auto& shape) {
+          if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, std::shared_ptr<const TriangleMesh>>)
+            return f(shape, pose, reach, 0.0);
+          else
+          {
+            for (Eigen::Index i = 0; i < shape->triangles.cols(); ++i)
+            {
+              const auto corner = [&](int c) { return Eigen::Vector3d(shape->vertices.col(shape->triangles(c, i))); };
+              const Pose at{pose * corner(0), pose.orientation};
+              const Triangle face{Eigen::Vector3d::Zero(), corner(1) - corner(0), corner(2) - corner(0)};
+              if (!f(face, at, std::max(face[1].norm(), face[2].norm()), 0.0))
+                return false;
+            }
+            return true;
+          }
+        },
+        solids[k].shape);
+    if (!passed)
+      return false;
+  }
   return true;
 }
 
@@ -60,15 +139,15 @@ template <class F>
 bool ThreadGuard::forOthers(const ThreadState& state, int first, int last, F&& f) const
 {
   const double radius = std::max(state.radius(first), state.radius(last));
-  const auto at = std::find_if(strands_.begin(), strands_.end(), [&](const Strand& s) { return s.state == &state; });
-  if (at == strands_.end())
+  const Strand* strand_of_state = strandOf(state);
+  if (!strand_of_state)
     return true;
-  const ContactProperties& own = at->contact;
-  const double core = at->merging > 0.0 ? at->merging : 1.0;
+  const ContactProperties& own = strand_of_state->contact;
+  const double core = strand_of_state->merging > 0.0 ? strand_of_state->merging : 1.0;
   const auto meets = [&](const ThreadState& other, int j) {
     return f(other.x[j], other.x[j + 1], other.radius(j), core);
   };
-  if (own.others && !forTubes(f))
+  if (own.others && !forRods(f))
     return false;
   for (const Strand& strand : strands_)
     if (strand.state != &state && own.others && strand.contact.others)

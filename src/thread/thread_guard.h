@@ -3,12 +3,12 @@
 #include <vector>
 
 #include "slender_sim/contact/contact_properties.h"
-#include "slender_sim/dynamics/chain_system.h"
+#include "island/equations.h"
 #include "slender_sim/thread/thread_remesh.h"
 
 namespace slender {
 
-/// Keeps the changes of shape of threads that touch each other and rods from passing through what they touch.
+/// Keeps threads from passing through what they touch when their meshes change.
 class ThreadGuard : public RemeshGuard
 {
 public:
@@ -22,30 +22,33 @@ public:
     ContactProperties contact;
     double merging;   ///< as WorldModel::Thread::merging
   };
-  /// A rod that threads touch, at its trial configuration.
-  struct Tube
-  {
-    const ChainSystem* chain;
-    Eigen::VectorXd radius;   ///< per edge [m]
-  };
   void setStrands(const std::vector<Strand>& strands) { strands_ = strands; }
-  void setTubes(std::vector<Tube> tubes) { tubes_ = std::move(tubes); }
+  /// The equations of the island, whose contact has all that is not a strand. A change of shape comes after the
+  /// solution of a substep, and sees what it touches where the substep ends.
+  void setIsland(const Equations* equations) { equations_ = equations; }
 
   bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from,
               const Eigen::Vector3d& to) const override;
   bool mayJoin(const ThreadState& state, int i) const override;
 
 private:
+  const Strand* strandOf(const ThreadState& state) const;
   /// Calls f(p, q, radius, core) for every segment that the edges first to last of `state` may touch; `core` is the
   /// share of both radii that may not be entered. Stops and returns false when f does.
   template <class F>
   bool forOthers(const ThreadState& state, int first, int last, F&& f) const;
   template <class F>
-  bool forTubes(F&& f) const;
+  bool forRods(F&& f) const;
+  /// Calls f(piece, pose, reach, thickness) for every triangle of a cloth, and every convex piece of a solid, that a
+  /// strand may touch; `reach`: of the piece around the pose's origin [m]. Stops and returns false when f does.
+  template <class F>
+  bool forFaces(const ContactProperties& own, F&& f) const;
+  template <class F>
+  bool forSolids(F&& f) const;
 
   double gap_;
   std::vector<Strand> strands_;
-  std::vector<Tube> tubes_;
+  const Equations* equations_ = nullptr;
 };
 
 }   // namespace slender

@@ -32,12 +32,15 @@ RodEvaluation ThreadSystem::takeRestStrains()
 {
   const int edges = a_.edges;
   for (int k = 0; k < 3; ++k)
+  {
+    std::copy_n(a_.x[k], a_.nodes, x_base_[k].data());
     for (int j = -2; j < edges + 10; ++j)   // the halo continues the end edges
       if (j < 0 || j >= edges)
       {
         a_.base_t[k][j] = a_.base_t[k][std::clamp(j, 0, edges - 1)];
         a_.base_d1[k][j] = a_.base_d1[k][std::clamp(j, 0, edges - 1)];
       }
+  }
   const RodEvaluation result = evaluateWhole(false);
   min_rest_length_ = std::numeric_limits<double>::infinity();
   for (int j = 0; j < edges; ++j)

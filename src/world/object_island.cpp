@@ -47,7 +47,6 @@ ObjectIsland::ObjectIsland(WorldObjects& objects, const std::vector<int>& places
 
 void ObjectIsland::sortObjects()
 {
-  std::vector<ThreadGuard::Tube> tubes;
   bool merges = false;
   for (const int place : places_)
   {
@@ -64,13 +63,10 @@ void ObjectIsland::sortObjects()
     if (auto* rod = dynamic_cast<RodObject*>(objects_.back()))
     {
       rods_.push_back(rod);
-      const RodModel& model = *rod->stepper->model;
-      nodes_ += model.nodes();
-      if (rod->reach().others)
-        tubes.push_back({&rod->stepper->system, model.radius_a.cwiseMax(model.radius_b)});
+      nodes_ += rod->stepper->model->nodes();
     }
   }
-  guard_.setTubes(std::move(tubes));
+  guard_.setIsland(&island_.equations());
   if (merges)
     island_.setAttraction(&merging_);
 }

@@ -4,6 +4,7 @@
 
 #include "slender_sim/geometry/rotation.h"
 #include "slender_sim/thread/thread_remesh.h"
+#include "src/thread/thread_guard.h"
 #include "test/support/threads.h"
 
 namespace slender::test {
@@ -208,6 +209,34 @@ TEST(ThreadRemesh, AGuardKeepsNodes)
   EXPECT_EQ(folded.nodes(), nodes);
   EXPECT_TRUE(mendFold(folded, 2, &low));
   EXPECT_EQ(folded.nodes(), nodes - 1);
+}
+
+/// A thread that is bent over the upper edge of a box, and lies on its sides.
+TEST(ThreadRemesh, AnEdgeDoesNotCutThroughTheCornerOfASolid)
+{
+  const double half = 0.5, radius = 0.05;
+  Eigen::Matrix3Xd x(3, 5);
+  for (int i = 0; i < 5; ++i)   // up, over the corner at (half, 0, half), and on
+    x.col(i) << (i < 2 ? half + 2 * radius : half - 0.3 * (i - 2)), 0, (i < 2 ? 0.3 * i : half + 2 * radius);
+  const ThreadState s = makeThread(x, Eigen::VectorXd::Constant(4, radius));
+  Equations island(false);
+  ContactSurface surface;
+  surface.solids.push_back({{Box{{2 * half, 2 * half, 2 * half}}, -1.0, "box"}});
+  island.solids.emplace_back();
+  island.setContact(surface, ContactOptions{0.01});
+  ThreadGuard guard(0.01);
+  guard.setIsland(&island);
+  guard.setStrands({{&s, ContactProperties(), 0.0}});
+  const auto placeBox = [&](double at) {
+    island.solids[0].start.position.x() = island.solids[0].target.X_WG.position.x() = at;
+    island.beginStep(1.0);
+    island.beginSubstep(0.0);
+  };
+  placeBox(0.0);
+  EXPECT_FALSE(mayRemove(s, 2, &guard));   // around the corner
+  EXPECT_TRUE(mayRemove(s, 3, &guard));    // along the upper side
+  placeBox(-1.0);
+  EXPECT_TRUE(mayRemove(s, 2, &guard));
 }
 
 TEST(ThreadRemesh, ADividedEdgeMayStayStraight)

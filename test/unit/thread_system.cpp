@@ -92,6 +92,16 @@ void setUniform(ThreadSystem& system, int edges, double length, double radius, d
     system.setEdge(j, 1.0, M_PI * radius * radius * length);
 }
 
+/// Contact takes a trial back towards the base, also when the mesh has changed since the last solution.
+TEST(ThreadConfiguration, WhatIsSetUpIsTheBase)
+{
+  ThreadSystem system;
+  setUniform(system, 4, 0.5, 0.1, 0.0, false);
+  setUniform(system, 6, 0.2, 0.1, 0.0, false);
+  for (int i = 0; i <= 6; ++i)
+    EXPECT_EQ(system.basePosition(i), Eigen::Vector3d(0.2 * i, 0, 0)) << i;
+}
+
 /// At a cut the surface pulls with 2 pi r gamma and the pressure gamma / r pushes with pi r gamma: pi r gamma is left,
 /// wherever the cut is. The cap only shares this force out between the nodes of the tip.
 TEST(SurfaceTension, TheTipOfAThreadIsPulledWithPiGammaRadius)

@@ -193,7 +193,6 @@ public:
   ~ContactPotential();
   ContactPotential(ContactPotential&&) noexcept;
   const ContactOptions& options() const;
-  const ContactSolid& solid(std::size_t number) const;
 
   /// Takes the points, segments, triangles, and objects of another surface, which must be sound; the solids stay. For
   /// curves that are fed and divided while they move.
@@ -204,7 +203,7 @@ public:
   /// sixteenth of it. What was brought together by something else than motion (a division, growing radii) can so begin
   /// a step. False: two centrelines or middle surfaces, or one and a solid, meet.
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
-  const std::vector<ContactSegment>& segments() const;
+  const ContactSurface& surface() const;
   /// Pairs of segments that thinToFit() found near each other: all those within the gap, and more. First and second are
   /// in order.
   const std::vector<GridPairs::Pair>& nearPairs() const;

@@ -24,7 +24,8 @@ public:
     put(a_.base_d1, j, d1);
   }
   void setTwist(int joint, double twist) { a_.base_twist[joint] = twist; }
-  /// Lengths and strains at the positions set become those of rest. Returns the evaluation, for its min_chi.
+  /// The positions set become the base, and lengths and strains there those of rest. Returns the evaluation, for its
+  /// min_chi.
   RodEvaluation takeRestStrains();
   double restLength(int j) const { return 1.0 / a_.inverse_rest_length[j]; }
 

@@ -404,7 +404,6 @@ void runCoupledSafety(StudyContext& context)
 }
 
 const StudyRegistration kCoupledSafetyRegistration{
-    "coupled_safety", "random scenes that mix all kinds of objects: nothing passes through anything",
-    runCoupledSafety};
+    "coupled_safety", "random scenes that mix all kinds of objects: nothing passes through anything", runCoupledSafety};
 
 }   // namespace slender::study
