@@ -69,11 +69,14 @@ bool HeldPieces::isInTheWay(const Piece& piece, const SolidPieces& solid, double
   }
   for (int k = 0; k < piece.corners; ++k)
     extent = std::max(extent, (start[k] - middle).norm());
-  if (middle.norm() > reach + extent + piece.radius + gap + moved)
+  // Between held vertices and the solid a layer of cloth needs its thickness, and a gap on both of its sides.
+  const double needed = piece.triangle ? 2.0 * (piece.radius + gap) : gap;
+  if (middle.norm() > reach + extent + piece.radius + needed + moved)
     return false;
-  const double most = gap + moved, before = roomOf(solid, start, piece.held, piece.radius, most),
+  const double most = needed + moved, before = roomOf(solid, start, piece.held, piece.radius, most),
                after = roomOf(solid, end, piece.held, piece.radius, most);
-  return 0.5 * (before + after - moved) < gap || roomOf(solid, start, piece.corners, piece.radius, gap) < kApart * gap;
+  return 0.5 * (before + after - moved) < needed ||
+         roomOf(solid, start, piece.corners, piece.radius, gap) < kApart * gap;
 }
 
 /// Smallest distance [m] of a piece of 1 to 3 corners from a solid, in whose frame they are, less the radius. It is at

@@ -32,16 +32,18 @@ bool ThreadGuard::allows(const ThreadState& state, int first, int last, const Ei
   const auto isOutside = [&](const ConvexPiece& piece, const Pose& pose, double reach, double r) {
     if ((pose.position - from).norm() > reach + radius + r + gap_ + 2.0 * std::max(reach_a, reach_b))
       return true;
+    // Contact presses apart what overlaps. The centreline must stay outside.
+    constexpr double kCore = 0.5;
     const RigidMotion rest(pose, pose);
     const Pose to_piece = pose.inverse();
-    const auto side = [&](const MovingPoint& end) {
-      ApproachLimit limit;
-      limit.thickness =
-          std::min(radius + r, 0.99 * segmentPieceDistance(piece, to_piece * end.from, to_piece * node.from).distance);
-      limit.reach = gap_;
-      return segmentSolidLimit(end, node, piece, rest, limit) >= 1.0;
-    };
-    return side(a) && side(b);
+    ApproachLimit limit;
+    limit.thickness = kCore * (radius + r);
+    for (const MovingPoint& end : {a, b})
+      limit.thickness = std::min(
+          limit.thickness, 0.99 * segmentPieceDistance(piece, to_piece * end.from, to_piece * node.from).distance);
+    limit.reach = gap_;
+    return segmentSolidLimit(a, node, piece, rest, limit) >= 1.0 &&
+           segmentSolidLimit(b, node, piece, rest, limit) >= 1.0;
   };
   const Strand* strand = strandOf(state);
   return !strand || (forOthers(state, first, last, isFree) && forFaces(strand->contact, isOutside));

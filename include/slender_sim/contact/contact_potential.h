@@ -219,9 +219,10 @@ public:
   /// earlier steps but stiffness() and springs().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
   /// In the next solution what is prescribed goes from (x, solids) to (x_end, solids_end). Where a solid that moves as
-  /// prescribed comes nearer to held points than the gap, nothing could give way. There it passes through the pieces at
-  /// these points, and only their free corners, and the edges between these, touch it, until the pieces are apart from
-  /// it and their held points out of its reach.
+  /// prescribed comes nearer to held points than the gap, nothing could give way, nor where it leaves no room for a
+  /// layer of cloth between held corners and itself. There it passes through the pieces at these points, and only their
+  /// free corners, and the edges between these, touch it, until the pieces are apart from it and their held points out
+  /// of its reach.
   void letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, const Eigen::Matrix3Xd& x_end,
                const std::vector<Pose>& solids_end);
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change

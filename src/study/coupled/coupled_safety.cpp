@@ -222,9 +222,9 @@ private:
     const double radius = draw_.scale(0.002, 0.006);
     std::ostringstream text;
     text << "centerline: {straight: {from: " << list(place - half) << ", to: " << list(place + half)
-         << ", edges: 12}}, radius: " << radius << ", fluid: {density: 1300, viscosity: " << draw_.scale(10, 1000)
+         << ", edges: 16}}, radius: " << radius << ", fluid: {density: 1300, viscosity: " << draw_.scale(10, 1000)
          << ", surface_tension: 0.04}, ends: {oldest: " << (draw_.count(0, 1) ? "free" : "held")
-         << "}, edges: {longest: " << 0.03 << ", shortest: 0.004}, breakup_radius: " << 0.05 * radius
+         << "}, edges: {longest: " << 0.012 << ", shortest: 0.003}, breakup_radius: " << 0.05 * radius
          << ", contact: {friction: " << friction() << "}, region: {from: [-2, -2, -1], to: [2, 2, 2]}";
     add(threads_, named("thread"), text.str());
   }
