@@ -73,7 +73,7 @@ void Candidates::findOnSolid(const ContactSurface& surface, int solid, const Sol
 {
   const Pose& pose = solids_[solid];
   const ContactSolid& properties = surface.solids[solid];
-  const double reach = boundingRadius(properties.shape), corner = std::sqrt(3.0) * margin;
+  const double reach = pieces.reach, corner = std::sqrt(3.0) * margin;
   for (std::size_t i = 0; i < surface.segments.size(); ++i)
   {
     const ContactSegment& s = surface.segments[i];

@@ -81,6 +81,8 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
     own.set(0.0, {options.least_stiffness, kInfinity});
   solids.resize(surface.solids.size());
   for (std::size_t k = 0; k < solids.size(); ++k)
+  {
+    solids[k].reach = boundingRadius(surface.solids[k].shape);
     std::visit(
         [&](const auto& shape) {
           using T = std::decay_t<decltype(shape)>;
@@ -96,6 +98,7 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
             solids[k].pieces.push_back(shape);
         },
         surface.solids[k].shape);
+  }
 }
 
 void ContactPotential::Impl::setPieces(const ContactSurface& pieces)

@@ -46,14 +46,14 @@ void HeldPieces::update(const ContactSurface& surface, const std::vector<SolidPi
     const Pose to_solid[2] = {motion.solids[k].inverse(), motion.solids_end[k].inverse()};
     for (const Piece& piece : pieces_)
       if (!(plane && piece.triangle) && mayTouch(surface, piece.object, solid) &&
-          isInTheWay(piece, solids[k], boundingRadius(solid.shape), to_solid, motion, gap))
+          isInTheWay(piece, solids[k], to_solid, motion, gap))
         passing_.emplace_back(static_cast<int>(k), piece.triangle, piece.index);
   }
 }
 
 /// Of a distance that is d0 at the start and d1 at the end of a motion by at most m, (d0 + d1 - m) / 2 is a lower
 /// bound.
-bool HeldPieces::isInTheWay(const Piece& piece, const SolidPieces& solid, double reach, const Pose (&to_solid)[2],
+bool HeldPieces::isInTheWay(const Piece& piece, const SolidPieces& solid, const Pose (&to_solid)[2],
                             const SurfaceMotion& motion, double gap)
 {
   constexpr double kApart = 0.01;   // of the gap: barriers keep more
@@ -71,7 +71,7 @@ bool HeldPieces::isInTheWay(const Piece& piece, const SolidPieces& solid, double
     extent = std::max(extent, (start[k] - middle).norm());
   // Between held vertices and the solid a layer of cloth needs its thickness, and a gap on both of its sides.
   const double needed = piece.triangle ? 2.0 * (piece.radius + gap) : gap;
-  if (middle.norm() > reach + extent + piece.radius + needed + moved)
+  if (middle.norm() > solid.reach + extent + piece.radius + needed + moved)
     return false;
   const double most = needed + moved, before = roomOf(solid, start, piece.held, piece.radius, most),
                after = roomOf(solid, end, piece.held, piece.radius, most);

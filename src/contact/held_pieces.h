@@ -30,8 +30,8 @@ private:
     int corner[3];   ///< points, the held ones first
   };
   void add(Piece piece, const int* corner, unsigned char driven);
-  bool isInTheWay(const Piece& piece, const SolidPieces& solid, double reach, const Pose (&to_solid)[2],
-                  const SurfaceMotion& motion, double gap);
+  bool isInTheWay(const Piece& piece, const SolidPieces& solid, const Pose (&to_solid)[2], const SurfaceMotion& motion,
+                  double gap);
   double roomOf(const SolidPieces& solid, const Eigen::Vector3d* corner, int corners, double radius, double most);
 
   std::vector<Piece> pieces_;

@@ -194,7 +194,7 @@ void SheetCandidates::findOnSolid(const ContactSurface& surface, const std::vect
   const Pose& pose = motion.solids[solid];
   const ContactSolid& properties = surface.solids[solid];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
-  const double reach = boundingRadius(properties.shape), shift = slack.shift[solid], turn = slack.turn[solid];
+  const double reach = pieces.reach, shift = slack.shift[solid], turn = slack.turn[solid];
   for (const SheetPieces::Face& face : faces)
   {
     Eigen::Vector3d z[3], middle = Eigen::Vector3d::Zero();

@@ -14,6 +14,7 @@ struct SolidPieces
 {
   std::vector<ConvexPiece> pieces;
   std::vector<MeshTree> tree;   ///< of a mesh: one; of other shapes: none
+  double reach = 0.0;           ///< boundingRadius() [m]
 };
 
 /// A motion of the points and solids of a contact surface.
@@ -51,7 +52,7 @@ inline bool passesThrough(const ContactSurface& surface, int object, const int* 
 inline bool mayTouch(const ContactSurface& surface, const ContactSegment& segment, const ContactSolid& solid)
 {
   const int points[2] = {segment.a, segment.b};
-  return !segment.prescribed() && mayTouch(surface, segment.object, solid) &&
+  return (solid.body || !segment.prescribed()) && mayTouch(surface, segment.object, solid) &&
          !passesThrough(surface, segment.object, points, 2, solid);
 }
 

@@ -86,5 +86,24 @@ obstacles:
   EXPECT_GT(s.state().rods[0].x(2, 1), 0.02);
 }
 
+/// Both ends of each edge are held. That must not let a simulated body through.
+TEST(HeldPieces, ABodyRestsOnARodThatIsHeldAlongItsLength)
+{
+  Simulation s(parseScene(R"(
+time: {step: 0.005, integrator: implicit_euler}
+rods:
+  - name: bar
+    centerline: {straight: {from: [-0.1, 0, 0], to: [0.1, 0, 0], edges: 4}}
+    cross_section: {radius: 0.01}
+    contact: {friction: 0.5}
+    grasps: {all: {edges: [0, 1, 2, 3]}}
+bodies:
+  - {name: ball, mass: 0.1, shape: {sphere: {radius: 0.03}}, pose: {position: [0, 0, 0.045]}}
+)"));
+  for (int k = 0; k < 40; ++k)
+    ASSERT_TRUE(s.step(s.defaultInputs()).ok);
+  EXPECT_GT(s.state().bodies[0].X_WB.position.z(), 0.04);   // both radii
+}
+
 }   // namespace
 }   // namespace slender::test

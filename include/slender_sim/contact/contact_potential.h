@@ -26,7 +26,7 @@ struct ContactSegment
   double length = 0.0;   ///< at rest [m]
   double core = 1.0;     ///< share of the radius that other segments may not enter (fluid parts merge down to it)
   /// Bit 0: a moves as prescribed; bit 1: b. A segment of which both do passes through what does so, too, solids
-  /// included.
+  /// included that no body carries.
   unsigned char driven = 0;
 
   double coreRadius() const { return core * radius; }

@@ -56,7 +56,7 @@ private:
   struct HeldPair
   {
     int object, obstacle, body;   ///< the obstacle or the body is -1
-    double reach;                 ///< distance from points of the object within which surfaces touch [m]
+    double reach, radius;         ///< of points of the object, within which surfaces touch; of the solid [m]
     const std::vector<IgnoredSolid>* ignored;
     bool told = false;
   };

@@ -70,10 +70,11 @@ void CrossingWatch::pairHeld(Kind kind, int index, double reach, const std::vect
   const SceneConfig& scene = simulation_.config();
   const auto object = std::find_if(objects_.begin(), objects_.end(),
                                    [&](const Object& o) { return o.kind == kind && o.index == index; });
-  HeldPair pair{static_cast<int>(object - objects_.begin()), -1, -1, reach, &ignored};
+  HeldPair pair{static_cast<int>(object - objects_.begin()), -1, -1, reach, 0.0, &ignored};
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
   {
     pair.obstacle = static_cast<int>(k);
+    pair.radius = boundingRadius(scene.obstacles[k].shape);
     held_.push_back(pair);
   }
   pair.obstacle = -1;
@@ -82,6 +83,7 @@ void CrossingWatch::pairHeld(Kind kind, int index, double reach, const std::vect
         body.motion && body.shape && body.contact && !(kind == Kind::rod && welds(body, index)))
     {
       pair.body = static_cast<int>(b);
+      pair.radius = boundingRadius(*body.shape);
       held_.push_back(pair);
     }
 }
@@ -183,6 +185,8 @@ void CrossingWatch::checkHeld(std::vector<std::string>& found)
 {
   held_inside_.clear();
   const WorldState& state = simulation_.state();
+  std::vector<int> points;
+  const Object* of = nullptr;   // of these points
   for (HeldPair& pair : held_)
   {
     const Object& object = objects_[pair.object];
@@ -191,14 +195,16 @@ void CrossingWatch::checkHeld(std::vector<std::string>& found)
     const Pose pose =
         pair.body < 0 ? state.obstacles[pair.obstacle] : state.bodies[pair.body].X_WB * bodies[pair.body].X_BS;
     const Eigen::Matrix3Xd& x = object.kind == Kind::cloth ? state.cloths[object.index].x : state.rods[object.index].x;
-    const double reach = boundingRadius(shape) + pair.reach;
-    for (const int i : heldPoints(object))
+    if (&object != of)
+      points = heldPoints(object);
+    of = &object;
+    for (const int i : points)
     {
       const bool ignored = std::any_of(pair.ignored->begin(), pair.ignored->end(), [&](const IgnoredSolid& solid) {
         return solid.number == pair.obstacle &&
                (solid.points.empty() || solid.points[static_cast<std::size_t>(i)] != 0);
       });
-      if (ignored || (x.col(i) - pose.position).norm() > reach ||
+      if (ignored || (x.col(i) - pose.position).norm() > pair.radius + pair.reach ||
           distanceToShape(shape, pose, x.col(i), x.col(i)) >= pair.reach)
         continue;
       char place[120];
