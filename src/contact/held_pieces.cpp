@@ -51,8 +51,8 @@ void HeldPieces::update(const ContactSurface& surface, const std::vector<SolidPi
   }
 }
 
-/// Of a distance that is d0 at the start and d1 at the end of a motion by at most m, (d0 + d1 - m) / 2 is a lower
-/// bound.
+/// Returns true if the solid must pass through the piece. If a distance is d0 at the start of a motion and d1 at its
+/// end, and points move by at most m, then the distance is at least (d0 + d1 - m) / 2 during the motion.
 bool HeldPieces::isInTheWay(const Piece& piece, const SolidPieces& solid, const Pose (&to_solid)[2],
                             const SurfaceMotion& motion, double gap)
 {

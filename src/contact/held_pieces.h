@@ -7,14 +7,14 @@
 
 namespace slender {
 
-/// Knows which solids pass through which pieces for now: solids that move as prescribed, and segments and triangles
-/// with held corners and free ones. See ContactPotential::letPass(). Memory is reused.
+/// Knows which prescribed solids pass at present through which segments and triangles. These pieces have held corners
+/// and free corners. See ContactPotential::letPass(). Memory is reused.
 class HeldPieces
 {
 public:
   /// Takes the pieces of a surface. No solid passes through them until the next update().
   void build(const ContactSurface& surface);
-  /// What is held moves with the solids from the start of the motion to its end, in which surfaces touch below the gap.
+  /// Finds the solids that must pass while held points and solids go from the start of the motion to its end.
   void update(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const SurfaceMotion& motion,
               double gap);
   /// Whether a solid passes through a piece, by the number of the segment or of the triangle.

@@ -76,7 +76,8 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     }
     if (approach == Approach::arrived)
       break;
-    // What is in the way gives way, then on from there. A far advance has pushed it along already.
+    // A solution lets the blocking parts give way. After a far advance it is not needed, because the advance has
+    // already pushed them along.
     const bool is_quick = pushes && k < kQuickAdvances;
     if (!is_quick || reached - from < kFarAdvance * way)
       system.contact()->stiffen(is_quick ? solve(quick, 1.0) : solve(loose, 0.1));

@@ -23,8 +23,8 @@ public:
     double merging;   ///< as WorldModel::Thread::merging
   };
   void setStrands(const std::vector<Strand>& strands) { strands_ = strands; }
-  /// The equations of the island, whose contact has all that is not a strand. A change of shape comes after the
-  /// solution of a substep, and sees what it touches where the substep ends.
+  /// Sets the equations of the island. Their contact has the surfaces of everything but the strands. Meshes change
+  /// after the solution of a substep, so that these surfaces are taken where the substep ends.
   void setIsland(const Equations* equations) { equations_ = equations; }
 
   bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from,

@@ -25,8 +25,8 @@ struct ContactSegment
   double start = 0.0;    ///< arc length of a along the object's curve [m]; b is at start + length
   double length = 0.0;   ///< at rest [m]
   double core = 1.0;     ///< share of the radius that other segments may not enter (fluid parts merge down to it)
-  /// Bit 0: a moves as prescribed; bit 1: b. A segment of which both do passes through what does so, too, solids
-  /// included that no body carries.
+  /// Bit 0: a moves as prescribed; bit 1: b does. If both do, the segment passes through everything else that moves as
+  /// prescribed, but it touches simulated bodies.
   unsigned char driven = 0;
 
   double coreRadius() const { return core * radius; }
@@ -209,8 +209,8 @@ public:
   const std::vector<GridPairs::Pair>& nearPairs() const;
 
   /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less:
-  /// they meet. Triangles that an edge passes through meet it. Of pieces with held points only the free corners, and
-  /// the edges between them, keep a distance from solids that move as prescribed. Shares no search structure and no
+  /// they meet. Triangles that an edge passes through meet it. If a piece has held points, only its free corners and
+  /// the edges between them count against solids that move as prescribed. Shares no search structure and no
   /// minimisation with the rest of this class. The surface of a mesh is touched from both sides.
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
 
@@ -218,11 +218,11 @@ public:
   /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from
   /// earlier steps but stiffness() and springs().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
-  /// In the next solution what is prescribed goes from (x, solids) to (x_end, solids_end). Where a solid that moves as
-  /// prescribed comes nearer to held points than the gap, nothing could give way, nor where it leaves no room for a
-  /// layer of cloth between held corners and itself. There it passes through the pieces at these points, and only their
-  /// free corners, and the edges between these, touch it, until the pieces are apart from it and their held points out
-  /// of its reach.
+  /// Tells where prescribed points and solids go in the next solution: from (x, solids) to (x_end, solids_end). If a
+  /// prescribed solid comes too near to held points, neither can give way. Then the pieces at these points let the
+  /// solid pass: only their free corners, and the edges between free corners, touch it. Too near is less than the gap;
+  /// for triangles, less than the room that a layer of cloth needs. A piece touches the solid again when it is apart
+  /// from the solid and its held points are not too near.
   void letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, const Eigen::Matrix3Xd& x_end,
                const std::vector<Pose>& solids_end);
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change

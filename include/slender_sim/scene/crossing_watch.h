@@ -13,8 +13,8 @@ namespace slender {
 /// simulated bodies. Bodies that are welded to a rod may be inside it. Of a cloth only the edges are
 /// checked. Pairs of cloths are not checked, because guides may pass through the cloths that follow them.
 ///
-/// Notices rods and cloths with contact as well that are held inside obstacles or driven bodies. Nothing can move these
-/// apart, so that held points pass through them, unlike the free ones.
+/// Also notices rods and cloths with contact that are held inside obstacles or driven bodies. Neither of the two can
+/// move away. The held points therefore pass through the obstacle; free points do not.
 class CrossingWatch
 {
 public:

@@ -1,4 +1,4 @@
-// Random scenes of everything that the package has; after each step an independent check of all pairs.
+// Random scenes with all kinds of objects. An independent check looks at all pairs after each step.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -188,7 +188,7 @@ void MixedCheck::take(const Simulation& scene)
                           : scene.state().bodies[k - obstacles].X_WB * scene.config().bodies[k - obstacles].X_BS;
 }
 
-/// Radii change when a step ends, with the lengths of the edges, so that a share of them must do.
+/// The radii of a thread change with its edges when a step ends. The check therefore asks for a share of them only.
 void MixedCheck::takeThreads(const Simulation& scene)
 {
   constexpr double kFirm = 0.5;

@@ -21,7 +21,7 @@ using Eigen::Vector3d;
 using Mesh = std::shared_ptr<const TriangleMesh>;
 
 constexpr double kDeepest = 1e-6;   // [m] FCL's own tolerance
-// Cylinders touch solids as prisms of 64 sides (docs/contact.md). Their sides are so much nearer to the axis.
+// Cylinders touch solids as prisms of 64 sides (docs/contact.md), whose sides are nearer to the axis by this factor.
 const double kPrism = std::cos(M_PI / 64);
 
 /// Lowest coordinate along a normal.
