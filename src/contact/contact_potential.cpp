@@ -77,6 +77,7 @@ ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
 {
   sheets_.build(surface);
   held_.build(surface);
+  listSegments();
   for (BarrierStiffness& own : stiffness)
     own.set(0.0, {options.least_stiffness, kInfinity});
   solids.resize(surface.solids.size());
@@ -110,12 +111,22 @@ void ContactPotential::Impl::setPieces(const ContactSurface& pieces)
   stiffness.resize(surface.objects.size());
   sheets_.build(surface);
   held_.build(surface);
+  listSegments();
   lagged.clear();
   contacts.clear();
   near_.clear();
   swept_.clear();
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
+}
+
+void ContactPotential::Impl::listSegments()
+{
+  segment_of_point_.assign(static_cast<std::size_t>(surface.points), -1);
+  for (std::size_t k = surface.segments.size(); k-- > 0;)
+    segment_of_point_[surface.segments[k].b] = static_cast<int>(k);
+  for (std::size_t k = 0; k < surface.segments.size(); ++k)
+    segment_of_point_[surface.segments[k].a] = static_cast<int>(k);
 }
 
 void ContactPotential::Impl::letPass(const SurfaceMotion& motion)
@@ -145,7 +156,8 @@ double ContactPotential::Impl::restart()
   return kInfinity;
 }
 
-double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
+double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness,
+                                        const Eigen::VectorXd* turns)
 {
   check(x, poses);
   restart();
@@ -171,7 +183,7 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
   if (!std::isfinite(energy))
     return restart();
   for (Contact& contact : lagged)
-    energy += addFriction(x, poses, contact, with_stiffness);
+    energy += addFriction(x, poses, turns, contact, with_stiffness);
   return energy;
 }
 
@@ -198,7 +210,7 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
                   Eigen::Vector3d::Zero(),
                   a.object,
                   b.object};
-  return addContact(gap, contact, 1.0, with_stiffness);
+  return addContact(x, gap, contact, 1.0, with_stiffness);
 }
 
 double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,
@@ -217,7 +229,7 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
     return 0.0;
   const Eigen::Vector3d ends[2] = {a, b};
   PairGap gap = facePieceGap(ends, 2, radius, piece);
-  const Eigen::Vector3d foot = a + gap.place[1] * (b - a) - (gap.gap / gap.weight + radius) * gap.normal;
+  const Eigen::Vector3d foot = a + gap.place[1] * (b - a) - radius * gap.normal;   // on the segment's surface
   gap.normal = pose.orientation * gap.normal;
   // behind the pairs of segments
   Contact contact{static_cast<std::int64_t>(surface.segments.size()) + on.solid,
@@ -231,10 +243,11 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
                   s.object,
                   -1};
   setOwn(contact, poses);
-  return addContact(gap, contact, rangeOf(s.object, on.solid), with_stiffness);
+  return addContact(x, gap, contact, rangeOf(s.object, on.solid), with_stiffness);
 }
 
-double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness)
+double ContactPotential::Impl::addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale,
+                                          bool with_stiffness)
 {
   if (!(gap.gap > 0.0))
     return kInfinity;
@@ -244,6 +257,7 @@ double ContactPotential::Impl::addContact(const PairGap& gap, Contact& contact, 
   const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier.force(g);
   copyFour(contact.weight, gap.place);
   contact.force = force * gap.weight * gap.normal;
+  setTurns(x, contact);
   ContactTerm& term = addTerm(contact);
   term.force = contact.force;
   if (with_stiffness)
@@ -275,6 +289,8 @@ ContactTerm& ContactPotential::Impl::addTerm(const Contact& contact)
   ContactTerm& term = terms.emplace_back();
   copyFour(term.point, contact.point);
   copyFour(term.weight, contact.weight);
+  for (int k = 0; k < 2; ++k)
+    term.turn[k].point = contact.turn[k].point;   // so that the matrix gets room for friction at once
   term.solid = contact.solid;
   term.position = contact.position;
   return term;
@@ -343,7 +359,7 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   impl_->x_begin = x;
   impl_->solids_begin = solids;
   impl_->h = h;
-  impl_->evaluate(x, solids, false);
+  impl_->evaluate(x, solids, false, nullptr);
   for (BarrierStiffness& own : impl_->stiffness)
     own.beginStep();
   impl_->lagFriction();
@@ -366,9 +382,10 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   return impl_->stepLimit(x, x_end, solids, solids_end);
 }
 
-double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness)
+double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
+                                  const Eigen::VectorXd* turns)
 {
-  return impl_->evaluate(x, solids, with_stiffness);
+  return impl_->evaluate(x, solids, with_stiffness, turns);
 }
 
 const std::vector<ContactTerm>& ContactPotential::terms() const { return impl_->terms; }

@@ -42,6 +42,7 @@ public:
     /// Of its spring: force where the step begins, and in the last evaluation.
     Eigen::Vector3d tension_begin = Eigen::Vector3d::Zero(), tension = Eigen::Vector3d::Zero();
     Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< the position in the frame of the carrier, if there is one
+    std::array<ContactTerm::Turn, 2> turn{};         ///< of friction
     /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
     bool has_iterate = false;
     Eigen::Vector3d last_slip = Eigen::Vector3d::Zero(), last_force = Eigen::Vector3d::Zero();
@@ -53,7 +54,8 @@ public:
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
-  double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
+  double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
+                  const Eigen::VectorXd* turns);
   double lagFriction();
   void keepSprings(const std::vector<Pose>& poses);
   void letPass(const SurfaceMotion& motion);
@@ -92,7 +94,9 @@ private:
       contact.own = poses[carrier].inverse() * contact.position;
   }
   /// `scale`: of the gap at which the pair repels.
-  double addContact(const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
+  double addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
+  void setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const;
+  void listSegments();
   /// Appends a term of a contact, without its force.
   ContactTerm& addTerm(const Contact& contact);
   void addMotion(const PairGap& gap, const Contact& contact, double force, double own);
@@ -109,7 +113,8 @@ private:
   FrictionSpring springOf(const Contact& contact) const;
   bool turnsWithSolid(const Contact& contact) const;
   double spin(const Contact& contact, const std::vector<Pose>& poses) const;
-  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact, bool with_stiffness);
+  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
+                     Contact& contact, bool with_stiffness);
   double restart();
 
   /// What thinToFit() made room for, and the distance [m] that remains forbidden there. Only this pair is thinner: a
@@ -162,6 +167,7 @@ private:
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;
+  std::vector<int> segment_of_point_;   ///< that begins at a point, or ends there if none begins; -1: none
   double margin_;
   std::vector<int> order_;   ///< for clearance()
   std::vector<BoundingBox> boxes_;

@@ -68,7 +68,7 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
     contact.position -= gap.place[k] * x.col(contact.point[k]);
   contact.object = object;
   contact.other = other;
-  return addContact(gap, contact, pair.scale, with_stiffness);
+  return addContact(x, gap, contact, pair.scale, with_stiffness);
 }
 
 double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
@@ -105,7 +105,7 @@ double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const 
   contact.object = face.object;
   contact.other = -1;
   setOwn(contact, poses);
-  return addContact(gap, contact, rangeOf(face.object, on.solid), with_stiffness);
+  return addContact(x, gap, contact, rangeOf(face.object, on.solid), with_stiffness);
 }
 
 double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,

@@ -55,8 +55,32 @@ double ContactPotential::Impl::frictionOf(const Contact& contact) const
   return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
-double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, Contact& contact,
-                                           bool with_stiffness)
+/// Finds how friction turns the curves of a contact: with the lever from the centreline to where the force acts. On a
+/// solid and between two curves that is the surface of the curve. On cloth it is the middle surface, so that both pieces
+/// get opposite moments.
+void ContactPotential::Impl::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
+{
+  const bool turns[2] = {surface.objects[contact.object].turns,
+                         contact.other >= 0 && surface.objects[contact.other].turns};
+  if (!turns[0] && !turns[1])
+    return;
+  Eigen::Vector3d middle[2] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  for (int k = 0; k < 4; ++k)
+    if (contact.point[k] >= 0)
+      middle[contact.weight[k] < 0.0] += std::abs(contact.weight[k]) * x.col(contact.point[k]);
+  const bool on_sheet = contact.solid < 0 && turns[0] != turns[1];
+  const Eigen::Vector3d place = on_sheet ? middle[turns[0]] : contact.position;
+  for (int side = 0; side < 2; ++side)
+    if (turns[side])
+    {
+      const ContactSegment& s = surface.segments[segment_of_point_[contact.point[2 * side]]];
+      const Eigen::Vector3d tangent = (x.col(s.b) - x.col(s.a)).normalized();
+      contact.turn[side] = {s.a, (side == 0 ? 1.0 : -1.0) * tangent.cross(place - middle[side])};
+    }
+}
+
+double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
+                                           const Eigen::VectorXd* turns, Contact& contact, bool with_stiffness)
 {
   const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   if (!(most > 0.0))
@@ -75,6 +99,10 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
     term.position = poses[contact.solid] * contact.material;
     u -= term.position - solids_begin[contact.solid] * contact.material;
   }
+  term.turn = contact.turn;
+  for (const ContactTerm::Turn& turn : contact.turn)
+    if (turns && turn.point >= 0)
+      u += (*turns)[turn.point] * turn.column;
   const SmoothedCoulomb law{options.slip_speed * h};
   const Eigen::Vector3d n = contact.force / normal_force;
   Eigen::Vector3d tension = contact.tension_begin;

@@ -22,8 +22,10 @@ void ChainPart::retreat(double share)
     }
 }
 
-/// Adds a stiffness between a node and the next one to the panels. The panel of the first node has room for both.
-void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness)
+/// Adds the stiffness of a displacement to the panels: of the weighted sum of a node and the next one, plus `column`
+/// times the turn of the edge between them. The panel of the first node has room for all of it.
+void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness,
+                            const Eigen::Vector3d& column)
 {
   const int node[2] = {nodeOf(point[0] - first_point), nodeOf(point[1] - first_point)};
   RodPanel* const panels = system_.panels();
@@ -36,6 +38,16 @@ void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], co
     for (int c = 0; c < 3; ++c)
       for (int r = 0; r < 3; ++r)
         panels[node[0]].below[c][r] += weight[0] * weight[1] * stiffness(r, c);
+  if (node[0] < 0 || column.isZero(0.0))
+    return;
+  const Eigen::Vector3d torque = stiffness * column;
+  for (int c = 0; c < 3; ++c)
+  {
+    panels[node[0]].diag[c][3] += weight[0] * torque[c];
+    if (node[1] >= 0)
+      panels[node[0]].below[3][c] += weight[1] * torque[c];
+  }
+  panels[node[0]].diag[3][3] += column.dot(torque);
 }
 
 /// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the band.
@@ -53,8 +65,10 @@ void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
   {
     for (int p = 0; p < 2; ++p)
       addForce(term->point[p] - first_point, term->weight[p] * term->force);
+    if (term->turns())
+      addTorque(term->point[0] - first_point, term->turn[0].column.dot(term->force));
     if (with_hessian)
-      addToPanels(term->point, term->weight, term->stiffness);
+      addToPanels(term->point, term->weight, term->stiffness, term->turn[0].column);
   }
   if (!with_hessian)
   {
@@ -162,6 +176,32 @@ void ChainPart::takeDirection(const double* solution)
 }
 
 // ---- contact
+
+void ChainPart::gatherTurns(Eigen::VectorXd& turns) const
+{
+  for (int point = 0; point < points(); ++point)
+    if (const int node = nodeOf(point); node >= 0 && node < system_.arrays().edges)
+      turns[first_point + point] = system_.turn(node);
+}
+
+void ChainPart::addColumns(int point, int component, double weight, Columns& row) const
+{
+  const int node = nodeOf(point), number = node < 0 ? kPrescribed : dof_[4 * node + component];
+  if (number >= 0)
+    row.push(offset + number, weight);
+}
+
+void ChainPart::addTorque(int point, double torque)
+{
+  if (const int node = nodeOf(point); node >= 0)
+    system_.gradient()[4 * node + 3] -= torque;
+}
+
+double ChainPart::moveTurn(int point) const
+{
+  const int node = nodeOf(point);
+  return node < 0 ? 0.0 : system_.direction()[4 * node + 3];
+}
 
 int ChainPart::base(int point) const
 {

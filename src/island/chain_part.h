@@ -36,9 +36,13 @@ public:
   void takeGradient(double* right) const override;
   void takeDirection(const double* solution) override;
 
+  void gatherTurns(Eigen::VectorXd& turns) const override;
   int base(int point) const override;
+  void addColumns(int point, int component, double weight, Columns& row) const override;
   void addForce(int point, const Eigen::Vector3d& force) override;
+  void addTorque(int point, double torque) override;
   Eigen::Vector3d move(int point) const override;
+  double moveTurn(int point) const override;
 
   double stepLimit() const override { return system_.stepLimit(); }
   double incrementSize(double) const override { return system_.incrementSize(); }
@@ -62,7 +66,8 @@ protected:
 private:
   template <class F>
   void forPanels(F&& f) const;
-  void addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
+  void addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness,
+                   const Eigen::Vector3d& column = Eigen::Vector3d::Zero());
 
   int unknowns_ = 0;
   SchurComplement schur_;   ///< of the averages, while the part is not coupled

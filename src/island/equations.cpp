@@ -41,6 +41,8 @@ void Equations::countPoints()
   for (auto* x : {&points_, &points_base_, &points_end_})
     if (x->cols() != count)
       x->resize(3, count);
+  for (auto* turns : {&turns_begin_, &turns_base_, &turns_})
+    turns->setZero(count);
 }
 
 void Equations::numberUnknowns()
@@ -150,6 +152,7 @@ void Equations::beginStage(bool first)
   matrix_.beginStage();
   // Friction sticks below a speed over the whole step. In substeps that range would become too narrow to find.
   contact_->begin(points_base_, poses_base_, duration_);
+  turns_begin_ = turns_base_;
   if (!first)
     return;
   if (attraction_)
@@ -171,6 +174,7 @@ void Equations::endStage()
 {
   points_base_ = points_;
   poses_base_ = poses_;
+  turns_base_ = turns_begin_ + turns_;
 }
 
 /// Goes from the base towards the trial, as far as nothing touches. Where nothing moves as prescribed, the trial that
@@ -271,6 +275,7 @@ double Equations::incrementSize() const
       u = carrierOf(term).moveAt(term.position);
     if (const RigidPart* body = bodyOf(term.solid))
       u -= body->moveAt(term.position);
+    forTurns(term, [&](Part& part, int point, const Eigen::Vector3d& column) { u += part.moveTurn(point) * column; });
     at_contact = std::max(at_contact, u.norm());
     if (term.slip_range > 0.0)
       sticking = std::max(sticking, u.norm() / term.slip_range);

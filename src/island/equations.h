@@ -123,14 +123,16 @@ private:
   void advance(double to);
   void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
 
-  /// Four points and a solid of a contact that couples unknowns.
-  using Key = std::array<int, 5>;
+  /// Four points and a solid of a contact that couples unknowns, and the segments that it turns.
+  using Key = std::array<int, 7>;
 
   template <class F>
   void forParts(F&& f);
   /// Calls f for all present contacts, and for the terms of the attraction.
   template <class F>
   void forTerms(F&& f) const;
+  template <class F>
+  void forTurns(const ContactTerm& term, F&& f) const;
   Part& partOf(int point) const { return *part_of_point_[point]; }
   /// The body that carries the points of a term.
   RigidPart& carrierOf(const ContactTerm& term) const { return static_cast<RigidPart&>(partOf(term.point[0])); }
@@ -149,7 +151,8 @@ private:
   std::vector<int> numberBlocks();
   SharedMatrix::Solver chooseSolver();
   SharedMatrix::Bases basesOf(const int (&point)[4]) const;
-  bool isCarried(const SharedMatrix::Bases& bases, int solid) const;
+  std::array<int, 2> turnsOf(const ContactTerm& term) const;
+  bool needsRows(const SharedMatrix::Bases& bases, int solid) const;
   void columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>& rows) const;
   void columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const;
   void addForce(const ContactTerm& term);
@@ -180,6 +183,9 @@ private:
   std::vector<Pose> prescribed_;   ///< per solid that no part carries, at the instant being solved for
   Eigen::Matrix3Xd points_, points_base_, points_end_;
   std::vector<Pose> poses_, poses_base_, poses_end_;   ///< of solids
+  /// Per point, turns of segments: at the start of the stage and at the base since the substep began, and at the trial
+  /// since the stage began [rad].
+  Eigen::VectorXd turns_begin_, turns_base_, turns_;
   bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;

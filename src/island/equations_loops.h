@@ -37,4 +37,13 @@ void Equations::forTerms(F&& f) const
       f(term);
 }
 
+/// Calls f(part, point, column) for the segments of curves that a term turns; `point` counts from 0 in the part.
+template <class F>
+void Equations::forTurns(const ContactTerm& term, F&& f) const
+{
+  for (const ContactTerm::Turn& turn : term.turn)
+    if (turn.point >= 0)
+      f(partOf(turn.point), turn.point - partOf(turn.point).first_point, turn.column);
+}
+
 }   // namespace slender

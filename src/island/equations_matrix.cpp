@@ -9,7 +9,8 @@ namespace slender {
 
 void Equations::makeRoom(const ContactTerm& term)
 {
-  const Key key{term.point[0], term.point[1], term.point[2], term.point[3], term.solid};
+  const Key key{term.point[0],   term.point[1],      term.point[2],     term.point[3],
+                term.solid, term.turn[0].point, term.turn[1].point};
   const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
   if (at != keys_.end() && *at == key)
     return;
@@ -59,6 +60,9 @@ void Equations::addForce(const ContactTerm& term)
     carrierOf(term).addForceAt(term.position, term.force);
   if (RigidPart* body = bodyOf(term.solid))
     body->addForceAt(term.position, -term.force);
+  forTurns(term, [&](Part& part, int point, const Eigen::Vector3d& column) {
+    part.addTorque(point, column.dot(term.force));
+  });
 }
 
 // ---- the pattern of the matrix
@@ -71,8 +75,23 @@ SharedMatrix::Bases Equations::basesOf(const int (&point)[4]) const
   return bases;
 }
 
-/// Whether a contact is one of points that do not have three unknowns each: a body carries one of them, or is touched.
-bool Equations::isCarried(const SharedMatrix::Bases& bases, int solid) const
+/// The unknowns of the turns of a term whose segments no body carries.
+std::array<int, 2> Equations::turnsOf(const ContactTerm& term) const
+{
+  std::array<int, 2> unknowns{Part::kPrescribed, Part::kPrescribed};
+  for (int k = 0; k < 2; ++k)
+    if (const int point = term.turn[k].point; point >= 0)
+    {
+      Part::Columns row;
+      partOf(point).addColumns(point - partOf(point).first_point, 3, 1.0, row);
+      if (row.count > 0)
+        unknowns[k] = row.index[0];
+    }
+  return unknowns;
+}
+
+/// Whether a contact is not one of points that have three unknowns each: a body carries one of them or is touched.
+bool Equations::needsRows(const SharedMatrix::Bases& bases, int solid) const
 {
   return bodyOf(solid) || std::any_of(bases.begin(), bases.end(), [](int base) { return base < Part::kPrescribed; });
 }
@@ -93,6 +112,9 @@ void Equations::columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>&
       }
     if (const RigidPart* body = bodyOf(term.solid))
       body->addColumnsAt(term.position, c, -1.0, rows[c]);
+    forTurns(term, [&](const Part& part, int point, const Eigen::Vector3d& column) {
+      part.addColumns(point, 3, column[c], rows[c]);
+    });
   }
 }
 
@@ -142,8 +164,10 @@ void Equations::buildPattern()
     ContactTerm term;
     std::copy_n(key.begin(), 4, term.point);
     term.solid = key[4];
+    for (int k = 0; k < 2; ++k)
+      term.turn[k].point = key[5 + k];
     const SharedMatrix::Bases bases = basesOf(term.point);
-    if (!isCarried(bases, term.solid))
+    if (term.turn[0].point < 0 && term.turn[1].point < 0 && !needsRows(bases, term.solid))
     {
       matrix_.noteBases(bases);
       continue;
@@ -217,9 +241,9 @@ void Equations::assemble(const HessianShift& shift, bool whole)
     if (!partOf(term.point[0]).coupled)
       return;
     const SharedMatrix::Bases bases = basesOf(term.point);
-    if (!isCarried(bases, term.solid))
+    if (!needsRows(bases, term.solid))
     {
-      matrix_.addTerm(term, bases, whole);
+      term.turns() ? matrix_.addTurningTerm(term, bases, turnsOf(term)) : matrix_.addTerm(term, bases, whole);
       return;
     }
     columnsOf(term, rows);
@@ -231,7 +255,7 @@ void Equations::assemble(const HessianShift& shift, bool whole)
     if (!partOf(row.point[0]).coupled)
       continue;
     const SharedMatrix::Bases bases = basesOf(row.point);
-    if (!isCarried(bases, row.solid))
+    if (!needsRows(bases, row.solid))
     {
       matrix_.addRow(row, bases, whole);
       continue;
@@ -255,7 +279,10 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   if (contact_)
   {
     gather(points_, poses_);
-    sum.potential = contact_->evaluate(points_, poses_, with_hessian);
+    for (const Part* part : parts_)
+      part->gatherTurns(turns_);
+    turns_ -= turns_begin_;
+    sum.potential = contact_->evaluate(points_, poses_, with_hessian, &turns_);
     if (!std::isfinite(sum.potential))
       return sum;
     if (pushing_)

@@ -51,15 +51,21 @@ public:
   /// Number of the first of a point's three unknowns in the matrix, or kPrescribed. Less than kPrescribed: its
   /// displacement depends on other unknowns, see addColumns().
   virtual int base(int) const { return kPrescribed; }
-  /// Adds a weighted component of the displacement of a point to a row of unknowns.
+  /// Writes the turns about their tangents of the segments that begin at its surface points into `turns`, likewise:
+  /// from the start of the substep to the trial [rad].
+  virtual void gatherTurns(Eigen::VectorXd&) const {}
+  /// Adds a weighted component of the displacement of a point to a row of unknowns. Component 3 of a curve is the turn
+  /// of the segment that begins there.
   virtual void addColumns(int point, int component, double weight, Columns& row) const
   {
     if (const int first = base(point); first >= 0)
       row.push(first + component, weight);
   }
   virtual void addForce(int, const Eigen::Vector3d&) {}   ///< gradient -= force
+  virtual void addTorque(int, double) {}                  ///< likewise, on the turn of a segment [N m]
   /// Displacement of a point by the direction [m].
   virtual Eigen::Vector3d move(int) const { return Eigen::Vector3d::Zero(); }
+  virtual double moveTurn(int) const { return 0.0; }   ///< likewise of the turn of a segment [rad]
 };
 
 /// A part of an island: something with unknowns of its own. A rod, a thread, a cloth, and a rigid body are parts.

@@ -208,6 +208,11 @@ void SharedMatrix::addRows(const Columns* rows, int count, const Eigen::Matrix3d
 {
   MergedRows merged;
   merge(rows, count, merged);
+  addMerged(merged, stiffness);
+}
+
+void SharedMatrix::addMerged(const MergedRows& merged, const Eigen::Matrix3d& stiffness)
+{
   for (int j = 0; j < merged.count; ++j)
   {
     const Eigen::Vector3d force = stiffness * merged.weight[j];
@@ -244,6 +249,28 @@ void SharedMatrix::addTerm(const ContactTerm& term, const Bases& bases, bool who
 {
   const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
   addBlocks(bases, [&](int i, int j) { return Eigen::Matrix3d(term.weight[i] * term.weight[j] * stiffness); });
+}
+
+void SharedMatrix::addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns)
+{
+  MergedRows merged;
+  const auto put = [&](int unknown, const Eigen::Vector3d& weight) {   // in ascending order
+    int at = merged.count++;
+    for (; at > 0 && merged.unknown[at - 1] > unknown; --at)
+    {
+      merged.unknown[at] = merged.unknown[at - 1];
+      merged.weight[at] = merged.weight[at - 1];
+    }
+    merged.unknown[at] = unknown;
+    merged.weight[at] = weight;
+  };
+  for (int p = 0; p < 4; ++p)
+    for (int c = 0; c < 3 && bases[p] >= 0; ++c)
+      put(bases[p] + c, term.weight[p] * Eigen::Vector3d::Unit(c));
+  for (int k = 0; k < 2; ++k)
+    if (turns[k] >= 0)
+      put(turns[k], term.turn[k].column);
+  addMerged(merged, term.stiffness);
 }
 
 void SharedMatrix::addRow(const ContactRow& row, const Bases& bases, bool whole)

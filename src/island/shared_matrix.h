@@ -72,6 +72,8 @@ public:
   void addRows(const Columns* rows, int count, const Eigen::Matrix3d& stiffness);
   /// Contacts of points with these bases, with or without the part of the second derivative that may be negative.
   void addTerm(const ContactTerm& term, const Bases& bases, bool whole);
+  /// The same for a term that turns segments; `turns`: the unknowns of their turns, negative: none.
+  void addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns);
   void addRow(const ContactRow& row, const Bases& bases, bool whole);
 
   /// Forgets the failures of factorisations with whole second derivatives.
@@ -128,6 +130,7 @@ private:
     std::array<Eigen::Vector3d, Columns::kMost> weight;
   };
   static void merge(const Columns* rows, int count, MergedRows& merged);
+  void addMerged(const MergedRows& merged, const Eigen::Matrix3d& stiffness);
 
   template <class Block>
   void addBlocks(const Bases& bases, Block&& block);

@@ -111,6 +111,7 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
   model.closed = closed;
   model.curvature = joints.curvature;
   model.mass = Eigen::VectorXd::Zero(n);
+  model.spin_inertia.resize(edges);
   model.rest_length.resize(edges);
   model.stretch_modulus.resize(edges);
   model.radius_a.resize(edges);
@@ -129,6 +130,7 @@ RodModel buildRod(const std::string& name, const Eigen::Matrix3Xd& nodes, bool c
     model.radius_a[j] = s.a;
     model.radius_b[j] = s.b;
     model.mass[j] += 0.5 * s.linear_density * length;
+    model.spin_inertia[j] = 0.25 * s.linear_density * length * (s.a * s.a + s.b * s.b);
     model.mass[(j + 1) % n] += 0.5 * s.linear_density * length;
   }
   for (int i = 0; i < n; ++i)

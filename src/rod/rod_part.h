@@ -46,11 +46,22 @@ public:
   {
     contact_ = contact;
     ignored_ = ignored.empty() ? nullptr : std::make_shared<std::vector<IgnoredSolid>>(ignored);
+    if (turns())
+      rod_.keepSpins();
   }
   int points() const override { return touches_ ? system_.nodes() : 0; }
   void addSurface(ContactSurface& surface) const override;
 
 private:
+  /// Friction turns the rod about its tangents. Methods whose stage lies inside a step relax the frames at its end,
+  /// which leaves no spins.
+  bool turns() const
+  {
+    const Integrator integrator = rod_.time.integrator;
+    return touches_ && contact_.friction > 0.0 && integrator != Integrator::implicit_midpoint &&
+           integrator != Integrator::generalized_alpha && !isExplicit(integrator);
+  }
+
   // ---- as Part
   int nodeOf(int point) const override { return point; }
   bool numberUnknowns() override;

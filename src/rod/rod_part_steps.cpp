@@ -91,6 +91,7 @@ void RodPart::addSurface(ContactSurface& surface) const
   }
   constexpr int kNoThread = -1;
   surface.objects.push_back({contact_, start, m.closed, kNoThread, nullptr, surface.points, ignored_});
+  surface.objects.back().turns = turns();
   surface.points += m.nodes();
 }
 

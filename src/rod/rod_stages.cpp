@@ -47,6 +47,8 @@ StepFailure RodStepper::Impl::beginStep(const StepPlan& step_plan, const RodInpu
   }
   if (model->stiffness_damping > 0)
     startStrainHistory(inputs, duration, t);
+  if (spins)
+    beginSpins();
   next = work;
   stage_q.resize(3, model->nodes());
   stage_v.resize(3, model->nodes());
@@ -71,6 +73,8 @@ void RodStepper::Impl::beginStage(std::size_t s, const RodInputs& inputs, double
       guess += 0.5 * ahead * ahead * work.a.col(i);
     system.setPosition(i, guess);
   }
+  if (spins)
+    beginSpinStage(s, h);
   placeAt(inputs, duration, (t + stage.time * h) / duration);
   if (model->stiffness_damping > 0)
     setViscousResponse(stage, h);
@@ -88,6 +92,8 @@ void RodStepper::Impl::endStage(std::size_t s, const RodInputs& inputs, double d
   }
   if (model->stiffness_damping > 0)
     system.strains(strain_stage);
+  if (spins)
+    endSpinStage(s);
   system.accept();
 }
 
@@ -121,6 +127,8 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
   }
   report.error_estimate = std::max(report.error_estimate, errorConstant(time.integrator) * h * h * jump);
   computeWrenches(inputs, h);
+  if (spins)
+    finishSpins();
 
   if (c != 1.0)
   {

@@ -168,6 +168,12 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
                state.a.allFinite() && state.x_previous.allFinite() && state.v_previous.allFinite() &&
                state.strain_rate.allFinite() && state.strain_rate_previous.allFinite() &&
                state.strain_previous.allFinite();
+  for (const Eigen::VectorXd* spin : {&state.spin, &state.spin_rate, &state.spin_previous, &state.turn_previous})
+  {
+    if (spin->size() != 0 && spin->size() != model->edges())
+      return refuse_count("spins", spin->size(), model->edges());
+    sound = sound && spin->allFinite();
+  }
   for (const GraspState& g : state.grasps)
     sound = sound && (!g.active || (g.X_WG.position.allFinite() && g.X_WG.orientation.coeffs().allFinite() &&
                                     g.velocity.linear.allFinite() && g.velocity.angular.allFinite() &&
@@ -204,6 +210,7 @@ double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& in
     potential -= f.dot(s.x.col(i));
     weight += f.norm();
   }
+  kinetic += spinEnergy(s);
   if (allowance)
     *allowance = 0.05 * (kinetic + e.stretch + e.bend_twist + weight * model->rest_length.sum()) +
                  1e-12 * model->stretch_modulus.dot(model->rest_length);   // a rod at rest: strains of a millionth
@@ -332,6 +339,7 @@ RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vecto
     result.kinetic += 0.5 * m.mass[i] * state.v.col(i).squaredNorm();
     result.gravity -= m.mass[i] * gravity.dot(state.x.col(i));
   }
+  result.kinetic += spinEnergy(state);
   if (isotropic)
   {
     const RodEvaluation e = isotropic->evaluate(state);

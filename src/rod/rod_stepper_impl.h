@@ -56,6 +56,9 @@ public:
   void endStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
   void finishStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
 
+  /// From now on edges have inertia about their tangents, see RodState::spin.
+  void keepSpins();
+
   // rod_explicit.cpp: an explicit substep; bodies move and constraints are projected between its two functions
   StepFailure explicitPredict(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
   StepFailure explicitFinish(const RodInputs& inputs, double duration, double t, double h);
@@ -78,6 +81,10 @@ public:
   std::array<int, 2> overstretched{-1, -1};   ///< held nodes that the last failed projection found too far apart
 
 private:
+  double spinEnergy(const RodState& state) const
+  {
+    return state.spin.size() > 0 ? 0.5 * model->spin_inertia.dot(state.spin.cwiseAbs2()) : 0.0;
+  }
   double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
   std::string explainFailure(StepFailure failure, double length) const;
   static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
@@ -86,6 +93,13 @@ private:
                                const Eigen::Vector3d& otherwise);
   Eigen::Vector3d combine(const Combination& c, int node) const;
   void computeWrenches(const RodInputs& inputs, double h);
+
+  // rod_spin.cpp: turns of edges about their tangents, with inertia
+  double combineTurn(const Combination& c, int edge) const;
+  void beginSpins();
+  void beginSpinStage(std::size_t stage, double h);
+  void endSpinStage(std::size_t stage);
+  void finishSpins();
 
   // rod_explicit.cpp
   RodEvaluation evaluateStart(const RodInputs& inputs, double duration, double t);
@@ -114,6 +128,8 @@ private:
   const StepPlan* plan = nullptr;   ///< of the substep
   RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
+  bool spins = false;
+  Eigen::VectorXd stage_turn, stage_spin;
   std::unique_ptr<IsotropicRod> isotropic;   ///< explicit steps of isotropic rods
   Eigen::Matrix4Xd strain_start, strain_stage, strain_reference, strain_end, strain_sag;
 };

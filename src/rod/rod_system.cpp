@@ -43,6 +43,8 @@ void RodSystem::load(const RodState& state)
   wrapHalo(a_.base_twist, n);
   std::fill(a_.turn - kHalo, a_.turn + n + kHalo, 0.0);
   forgetTurns();
+  if (spins_)
+    spin_inertia_.resize(edges);
   for (ClampJoint& c : clamps_.joints)
   {
     const GraspState& g = state.grasps[c.grasp];
@@ -72,20 +74,37 @@ void RodSystem::store(RodState& state) const
 void RodSystem::setTwistLoads(const Eigen::VectorXd& torques)
 {
   twist_loads_.set(torques);
-  keepTurns(!twist_loads_.empty());
   listTerms();
+}
+
+void RodSystem::keepSpins(bool keep)
+{
+  spins_ = keep;
+  spin_inertia_.resize(a_.edges);
+  listTerms();
+}
+
+void RodSystem::setTurn(int edge, double turn)
+{
+  if (!mayTurn(edge))
+    return;
+  a_.turn[edge] = turn;
+  wrapHalo(a_.turn, a_.edges);
 }
 
 double RodSystem::twistWork() const { return twist_loads_.work(a_, turned()); }
 
-/// A rod without clamps or torques does not visit them.
+/// A rod without clamps, torques or spins does not visit them.
 void RodSystem::listTerms()
 {
+  keepTurns(spins_ || !twist_loads_.empty());
   clearTerms();
   if (!clamps_.joints.empty())
     addTerm(clamps_);
   if (!twist_loads_.empty())
     addTerm(twist_loads_);
+  if (spins_)
+    addTerm(spin_inertia_);
 }
 
 void RodSystem::strains(Eigen::Matrix4Xd& out) const

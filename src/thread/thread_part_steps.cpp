@@ -36,6 +36,7 @@ void ThreadPart::addSurface(ContactSurface& surface) const
     s.start += s.length;
   }
   surface.objects.push_back({contact_, s.start, false, owner_});
+  surface.objects.back().turns = contact_.friction > 0.0;
   surface.points += state.nodes();
 }
 

@@ -158,7 +158,7 @@ TEST_F(FileLimits, statesOfOneSceneFitItWhateverTheirChecksumSays)
   constexpr std::size_t header = 5 * 8, nodes = 5, edges = 4;
   constexpr std::size_t x = header + 3 * 8 + 2 * 8;   // time, steps, number of rods; rows and columns
   constexpr std::size_t grasp =
-      header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + (2 * 8 + edges * 24) + (2 * 8 + nodes * 8) + (2 * 8 + 24) + 8;
+      header + 3 * 8 + 2 * (2 * 8 + nodes * 24) + (2 * 8 + edges * 24) + (2 * 8 + nodes * 8) + (2 * 8 + 24) + 2 * 8 + 8;
   EXPECT_EQ(refusalWith(held, good, x, 0.25), "");
   EXPECT_NE(refusalWith(held, good, x, std::nan("")).find("not finite"), std::string::npos);
   EXPECT_EQ(refusalWith(held, good, grasp, char{0}), "");   // released

@@ -70,6 +70,8 @@ struct ContactObject : ContactProperties
   /// Number of the solid, if this object is the surface of a simulated body; -1 otherwise. Friction then acts where the
   /// surfaces meet. It does not act at the points of the surface, because these may lie inside of the body.
   int carrier = -1;
+  /// Friction also turns the segments of this curve about their tangents. Otherwise it acts at the centreline.
+  bool turns = false;
 };
 
 /// A solid of a contact surface, which moves rigidly, and which objects of the surface pass through it.
@@ -137,6 +139,13 @@ bool operator<(const FrictionSpring& a, const FrictionSpring& b);
 /// under its force, is not. A pair gives one term with its normal force; with friction, one more.
 struct ContactTerm
 {
+  /// A segment of a curve that friction turns about its tangent.
+  struct Turn
+  {
+    int point = -1;                    ///< where the segment begins; -1: unused
+    Eigen::Vector3d column{0, 0, 0};   ///< what a turn of 1 rad adds to u [m]; zero in terms of normal forces
+  };
+
   int point[4] = {-1, -1, -1, -1};   ///< -1: unused
   double weight[4] = {0, 0, 0, 0};
   int solid = -1;                      ///< that is touched, -1: none
@@ -144,9 +153,12 @@ struct ContactTerm
   /// u begins with the displacement of the material point at `position` of the body that carries the points, in place
   /// of the sum over the points.
   bool carried = false;
+  std::array<Turn, 2> turn{};       ///< u also contains column times the turn of each of these segments
   Eigen::Vector3d force{0, 0, 0};   ///< on u [N], friction included
   double slip_range = 0.0;          ///< of friction that sticks: stretch at which it slips [m]; 0: other terms
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
+
+  bool turns() const { return !turn[0].column.isZero(0.0) || !turn[1].column.isZero(0.0); }
 };
 
 /// What a pair's second derivative contains besides, because the place of contact runs along the pieces: stiffness r
@@ -246,8 +258,10 @@ public:
   /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that
   /// depends on x and solids only; their stiffness and rows() only on request. The second derivative is exact for pairs
   /// of segments and triangles; of solids, what their own curvature and turning add to it is left out, and friction's
-  /// is that of the secant where it slips back and forth.
-  double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
+  /// is that of the secant where it slips back and forth. `turns`: per point, by how much the segment that begins there
+  /// has turned about its tangent since begin() [rad]; null: none has turned.
+  double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
+                  const Eigen::VectorXd* turns = nullptr);
   const std::vector<ContactTerm>& terms() const;
   const std::vector<ContactRow>& rows() const;
   /// Adds to the normal forces of terms() what they gain, to first order, when the solids that move as prescribed go

@@ -20,6 +20,7 @@ struct RodModel
 
   Eigen::VectorXd mass;                 ///< per node [kg], lumped Voronoi cells
   Eigen::VectorXd rest_length;          ///< per edge [m]
+  Eigen::VectorXd spin_inertia;         ///< per edge, about the tangent [kg m^2]
   Eigen::VectorXd stretch_modulus;      ///< per edge k_s [N]
   Eigen::VectorXd radius_a, radius_b;   ///< per edge semi-axes [m]
   Eigen::Matrix3Xd bend_modulus;        ///< per node (B11, B12, B22) [N m^2]

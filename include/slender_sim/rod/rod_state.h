@@ -39,6 +39,9 @@ struct RodState
   /// of its first edge, and the others follow by parallel transport along it (see forEachFrame). Of other rods without
   /// meaning.
   Eigen::Vector3d director{0, 0, 0};
+  /// Angular velocity of each edge about its tangent [rad/s]. Empty: frames have no inertia (thesis 4.3), which is so
+  /// for rods that friction does not turn.
+  Eigen::VectorXd spin;
   std::vector<GraspState> grasps;
 
   /// Integrator memory (empty when the integrator has none, or has not stepped yet).
@@ -46,6 +49,8 @@ struct RodState
   double next_step = 0.0;                    ///< [s] where the error control left off, 0 = nowhere
   Eigen::Matrix3Xd a;                        ///< accelerations
   Eigen::Matrix3Xd x_previous, v_previous;   ///< multistep methods
+  /// The same of spins: angular accelerations; spins one step ago, and the turns since then [rad].
+  Eigen::VectorXd spin_rate, spin_previous, turn_previous;
   /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1,
   /// kappa2, twist).
   Eigen::Matrix4Xd strain_rate, strain_rate_previous;   ///< [1/s]
@@ -61,6 +66,8 @@ struct RodState
     last_step = next_step = 0.0;
     for (auto* m : {&a, &x_previous, &v_previous})
       m->resize(3, 0);
+    for (auto* m : {&spin_rate, &spin_previous, &turn_previous})
+      m->resize(0);
     for (auto* m : {&strain_rate, &strain_rate_previous, &strain_previous})
       m->resize(4, 0);
   }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "slender_sim/dynamics/chain_system.h"
+#include "slender_sim/energy/spin_inertia.h"
 #include "slender_sim/energy/twist_loads.h"
 #include "slender_sim/rod/clamp_joint.h"
 #include "slender_sim/rod/rod_model.h"
@@ -40,6 +41,11 @@ public:
   /// tangents that is exact. Where a tangent turns as well, such a torque has no potential: its force field is M_j on
   /// theta_j and nothing on positions, and the matrix leaves out its skew part.
   void setTwistLoads(const Eigen::VectorXd& torques);
+  /// Whether edges have inertia about their tangents; from load() on it is zero.
+  void keepSpins(bool keep);
+  void setSpin(int edge, double weight, double target) { spin_inertia_.set(edge, weight, target); }
+  /// Trial turn of an edge from the base; nothing happens where it is prescribed [rad].
+  void setTurn(int edge, double turn);
   /// Work of these torques on the way from the state of load() to the trial [J].
   double twistWork() const;
 
@@ -90,6 +96,8 @@ private:
   std::vector<GraspState> grasps_;
   ClampJoints clamps_;
   TwistLoads twist_loads_;
+  SpinInertia spin_inertia_;
+  bool spins_ = false;
   std::vector<char> carried_;   ///< per node: held by a simulated body
 };
 

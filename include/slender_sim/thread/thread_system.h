@@ -43,8 +43,6 @@ public:
   void hold(int node) { holds_.hold(node); }
   void holdTurn(int edge) { holds_.holdTurn(edge); }
 
-  /// Turn of edge j about its tangent since the start of the step [rad].
-  double turn(int j) const { return turned()[j] + a_.turn[j]; }
   /// Joint of the last trial with the sharpest turn beyond a right angle, -1: none.
   int sharpestJoint() const;
 

@@ -1,0 +1,91 @@
+// Edges that turn about their tangents with inertia, in the implicit substeps of one rod. Frames of other rods are in
+// equilibrium at every instant (thesis 4.3).
+#include "rod_stepper_impl.h"
+
+namespace slender {
+
+void RodStepper::Impl::keepSpins()
+{
+  spins = true;
+  system.keepSpins(true);
+}
+
+/// As combine(), of the turn of an edge since the substep began.
+double RodStepper::Impl::combineTurn(const Combination& c, int j) const
+{
+  double sum = c[kV] * work.spin[j];
+  if (c[kA] != 0)
+    sum += c[kA] * work.spin_rate[j];
+  if (c[kQPrevious] != 0)
+    sum += c[kVPrevious] * work.spin_previous[j] - c[kQPrevious] * work.turn_previous[j];
+  if (c[kQStage] != 0)
+    sum += c[kQStage] * stage_turn[j] + c[kVStage] * stage_spin[j];
+  return sum;
+}
+
+/// What the state does not know yet is zero.
+void RodStepper::Impl::beginSpins()
+{
+  const bool multistep = work.x_previous.cols() > 0, accelerated = work.a.cols() > 0;
+  const auto complete = [&](Eigen::VectorXd& v) {
+    if (v.size() == 0)
+      v.setZero(model->edges());
+  };
+  complete(work.spin);
+  if (accelerated)
+    complete(work.spin_rate);
+  if (multistep)
+  {
+    complete(work.spin_previous);
+    complete(work.turn_previous);
+  }
+  stage_turn.resize(model->edges());
+  stage_spin.resize(model->edges());
+}
+
+void RodStepper::Impl::beginSpinStage(std::size_t s, double h)
+{
+  const Stage& stage = plan->stages[s];
+  const double inertia = 1.0 / (stage.tau_a * stage.tau_a), damping = model->mass_damping / stage.tau_v;
+  for (int j = 0; j < model->edges(); ++j)
+  {
+    const double target = (inertia * combineTurn(stage.q_hat, j) + damping * combineTurn(stage.q_tilde, j)) /
+                          (inertia + damping);
+    system.setSpin(j, model->spin_inertia[j] * (inertia + damping), target);
+    system.setTurn(j, s == 0 ? stage.time * h * work.spin[j] : (1 - plan->stages[0].time) * h * stage_spin[j]);
+  }
+}
+
+void RodStepper::Impl::endSpinStage(std::size_t s)
+{
+  const Stage& stage = plan->stages[s];
+  for (int j = 0; j < model->edges(); ++j)
+  {
+    stage_turn[j] = system.turn(j);
+    stage_spin[j] = (stage_turn[j] - combineTurn(stage.q_tilde, j)) / stage.tau_v;
+  }
+}
+
+void RodStepper::Impl::finishSpins()
+{
+  const Stage& stage = plan->stages.back();
+  for (int j = 0; j < model->edges(); ++j)
+  {
+    const double turn = system.turn(j);
+    next.spin[j] = (turn - combineTurn(stage.q_tilde, j)) / stage.tau_v;
+    if (next.spin_rate.size() > 0)
+    {
+      const double rate = (turn - combineTurn(stage.q_hat, j)) / (stage.tau_a * stage.tau_a);
+      next.spin_rate[j] = work.spin_rate[j] + (rate - work.spin_rate[j]) / plan->a_fraction;
+    }
+    if (time.integrator == Integrator::bdf2)
+    {
+      next.turn_previous.resize(model->edges());
+      next.turn_previous[j] = turn;
+    }
+  }
+  if (time.integrator == Integrator::bdf2)
+    next.spin_previous = work.spin;
+}
+
+}   // namespace slender
