@@ -128,10 +128,12 @@ std::string whyNoBarrier(const SceneConfig& scene, std::size_t k)
   const auto& tracking = scene.cloths[k].tracking;
   if (!tracking)
     return "";
-  if (tracking->sets[0].bounds.size() > 0)
+  // sets that could not be read have no constraints, and a list of them may be empty
+  const std::vector<FunctionSet>& sets = tracking->sets;
+  if (std::any_of(sets.begin(), sets.end(), [](const FunctionSet& set) { return set.bounds.size() > 0; }))
     return "has a max_traction";
-  const bool many = std::any_of(tracking->sets.begin(), tracking->sets.end(), [](const FunctionSet& set) {
-    return set.constraints->count() > ClothPart::kMostAverages;
+  const bool many = std::any_of(sets.begin(), sets.end(), [](const FunctionSet& set) {
+    return set.constraints && set.constraints->count() > ClothPart::kMostAverages;
   });
   return many ? "has more than " + std::to_string(ClothPart::kMostAverages) + " test functions" : "";
 }
