@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -300,6 +301,11 @@ struct BodyConfig
   std::optional<double> friction;   ///< [-]; nothing: that of the rod; against solids 0.3
   bool broadcast_tf = false;        ///< nodes publish the frame of the body on tf
   std::vector<WeldConfig> welds;
+
+  bool isWeldedTo(int rod) const
+  {
+    return std::any_of(welds.begin(), welds.end(), [rod](const WeldConfig& weld) { return weld.rod == rod; });
+  }
 };
 
 /// A number that the scene gives: constant (one entry), or over time; or set by messages, until the first of which it

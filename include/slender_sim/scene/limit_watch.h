@@ -9,8 +9,6 @@
 
 namespace slender {
 
-const char* toString(OnLimit on_limit);
-
 /// An event: a value begins to exceed its limit.
 struct LimitExcess
 {

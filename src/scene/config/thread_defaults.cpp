@@ -2,7 +2,6 @@
 // is not resolved.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <vector>
 
@@ -147,12 +146,7 @@ Needs needsOf(const Falls& falls, const ThreadConfig& thread, double gravity)
 }
 
 /// With three digits: an estimate.
-std::string about(double value)
-{
-  char text[40];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
+std::string about(double value) { return shortNumber(value, 3); }
 
 /// "2.5 mm".
 std::string millimetres(double length) { return about(1e3 * length) + " mm"; }
@@ -160,7 +154,7 @@ std::string millimetres(double length) { return about(1e3 * length) + " mm"; }
 void checkHeight(const Falls& falls, const ThreadConfig& thread, const YamlCursor& at)
 {
   const NozzleConfig& nozzle = *thread.nozzle;
-  YamlMap map(YamlMap(at).find("nozzle"));
+  YamlMap map(at.find("nozzle"));
   const YamlCursor place =
       std::holds_alternative<TableMotion>(nozzle.motion) ? map.find("motion") : map.find("position");
   const double radius = 0.5 * nozzle.diameter;
@@ -190,20 +184,19 @@ void checkDripping(const ThreadConfig& thread, const YamlCursor& at, double grav
   const double least = leastJettingSpeed(fall, thread.surface_tension);
   if (flow < least * area)
   {
-    YamlMap(YamlMap(at).find("nozzle"))
-        .find("flow")
-        .problem("is " + about(flow / area) +
-                 " m/s in the nozzle, at which so thin a fluid drips: surface tension draws "
-                 "it up, and no thread forms. Must be at least " +
-                 about(least * area) +
-                 " m^3/s, or the fluid more viscous, or fluid.surface_tension: 0 for the falling part alone");
+    at.find("nozzle").find("flow").problem(
+        "is " + about(flow / area) +
+        " m/s in the nozzle, at which so thin a fluid drips: surface tension draws it up, and no thread "
+        "forms. Must be at least " +
+        about(least * area) +
+        " m^3/s, or the fluid more viscous, or fluid.surface_tension: 0 for the falling part alone");
   }
 }
 
 /// What was given, against what forms.
 void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thread, const YamlCursor& at, double step)
 {
-  YamlMap edges(YamlMap(at).find("edges"));
+  YamlMap edges(at.find("edges"));
   if (thread.feed_length > 0 && thread.feed_length > 0.5 * falls.least)
   {
     edges.find("feed").problem("is more than half of the fall of " + millimetres(falls.least) + "; must be at most " +
@@ -213,10 +206,10 @@ void checkGiven(const Needs& needs, const Falls& falls, const ThreadConfig& thre
   const Landing& landing = needs.tightest;
   if (!landing.slender())
   {
-    YamlMap(at).find("nozzle").warning(
-        "a coil would be no wider than the thread (" + millimetres(landing.coil_radius) + " beside a radius of " +
-        millimetres(landing.radius) +
-        "): it falls as a jet and ends in a puddle, which is no thread. Only the falling " + "part is to be trusted.");
+    at.find("nozzle").warning("a coil would be no wider than the thread (" + millimetres(landing.coil_radius) +
+                              " beside a radius of " + millimetres(landing.radius) +
+                              "): it falls as a jet and ends in a puddle, which is no thread. Only the falling " +
+                              "part is to be trusted.");
     return;
   }
   const double longest = thread.longest_edge > 0 ? thread.longest_edge : thread.feed_length;
@@ -287,7 +280,7 @@ void swirl(const Falls& falls, const Needs& needs, ThreadConfig& thread, const Y
 {
   if (!(thread.swirl > 0))
     return;
-  const YamlCursor key = YamlMap(YamlMap(at).find("nozzle")).find("swirl");
+  const YamlCursor key = at.find("nozzle").find("swirl");
   if (falls.heights.empty())
     key.warning(
         "has no effect: there is nothing below the nozzle on which a coil could form; give a floor, or leave it out");

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdio>
 #include <sstream>
 
 #include "scene_tree.h"
@@ -135,13 +134,6 @@ void setPlace(YamlTree& tree, const std::string& where)
     setPlace(member.second, where);
 }
 
-std::string trimmed(const std::string& text)
-{
-  const char* const blank = " \t\r\n";
-  const auto first = text.find_first_not_of(blank);
-  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
-}
-
 YamlTree SceneText::parsed(const std::string& text) const
 {
   YamlTree tree = parseYaml(text, where_);
@@ -164,11 +156,8 @@ const ObjectEntry& SceneText::find(const std::string& name, const std::vector<st
   }
   if (found.empty())
   {
-    const std::string nearest = nearestWord(name, names);
-    names.resize(std::min<std::size_t>(names.size(), 20));
     refuse("there is no object \"" + name + "\" for this" +
-           (names.empty() ? "" : "; the scene has: " + joinWords(names)) +
-           (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+           (names.empty() ? "" : "; the scene has: " + joinWords(names, 20)) + didYouMean(name, names));
   }
   if (found.size() > 1)
   {
@@ -190,8 +179,7 @@ void SceneText::spawn(const std::string& text)
     if (section == "tracked" || section == "generate")
     {
       refuse(section +
-             " belongs into the scene from its start; what can be spawned: rods, threads, cloths, bodies, "
-             "obstacles");
+             " belongs into the scene from its start; what can be spawned: rods, threads, cloths, bodies, obstacles");
     }
     if (std::find(all_sections.begin(), all_sections.end(), section) == all_sections.end())
     {
@@ -231,8 +219,8 @@ void SceneText::attach(const std::string& text)
   if (!fits)
   {
     refuse(
-        "the text must be OBJECT: {GRASP: {...}} with the keys of a grasp in a scene file, for example rope: "
-        "{hand: {edges: [-1], motion: {topic: true}}}");
+        "the text must be OBJECT: {GRASP: {...}} with the keys of a grasp in a scene file, for example rope: {hand: "
+        "{edges: [-1], motion: {topic: true}}}");
   }
   YamlTree& grasps = keyOf(textOf(find(added.members[0].first, {"rods", "cloths", "tracked"})), "grasps");
   for (const auto& [name, grasp] : added.members[0].second.members)
@@ -242,9 +230,8 @@ void SceneText::attach(const std::string& text)
     for (const char* key : {"direction", "director"})
       if (grasp.find(key))
         refuse(std::string(key) +
-               " turns a section as the scene starts; a grasp that is attached later holds it as "
-               "it is: leave " +
-               key + " out");
+               " turns a section as the scene starts; a grasp that is attached later holds it as it is: leave " + key +
+               " out");
     keyOf(grasps, name) = grasp;
   }
 }
@@ -268,10 +255,8 @@ void SceneText::detach(const std::string& name)
     for (std::size_t g = 0; grasps && g < grasps->members.size(); ++g)
       names.push_back(grasps->members[g].first);
   }
-  const std::string nearest = nearestWord(wanted, names);
   refuse("there is no grasp \"" + wanted + "\" in the text of the scene" +
-         (names.empty() ? "" : "; it has: " + joinWords(names)) +
-         (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+         (names.empty() ? "" : "; it has: " + joinWords(names)) + didYouMean(wanted, names));
 }
 
 /// Keys whose values ~set_parameter may change, by section.
@@ -287,11 +272,7 @@ const std::vector<std::pair<std::string, std::vector<std::string>>> changeable{
 
 void SceneText::checkPath(const std::string& assignment) const
 {
-  std::vector<std::string> parts;
-  std::istringstream path(assignment.substr(0, assignment.find('=')));
-  for (std::string part; std::getline(path, part, '.');)
-    parts.push_back(part);
-  parts.resize(std::max<std::size_t>(parts.size(), 1));
+  const std::vector<std::string> parts = splitPath(assignment.substr(0, assignment.find('=')));
   for (const auto& [section, keys] : changeable)
   {
     if (section != parts[0])
@@ -304,8 +285,8 @@ void SceneText::checkPath(const std::string& assignment) const
            (listed ? ".NAME." : ".") + "KEY with KEY one of " + joinWords(keys) + "; for others start the scene anew");
   }
   refuse(assignment +
-         ": may not change while the scene runs; what may: wind.velocity, contact, and materials, "
-         "damping, contact and loads of rods, threads, cloths, tracked, bodies and obstacles");
+         ": may not change while the scene runs; what may: wind.velocity, contact, and materials, damping, contact and "
+         "loads of rods, threads, cloths, tracked, bodies and obstacles");
 }
 
 void SceneText::setParameters(const std::string& text)
@@ -343,11 +324,7 @@ bool SceneText::keepDefaults(const SceneConfig& before, const SceneConfig& after
   if (integrates && after.time.integrator != before.time.integrator)
     keep(keyOf(tree_, "time"), "integrator", toString(before.time.integrator));
   if (before.contact.gap > 0 && after.contact.gap > 0 && after.contact.gap != before.contact.gap)
-  {
-    char gap[40];
-    std::snprintf(gap, sizeof gap, "%.17g", before.contact.gap);
-    keep(keyOf(tree_, "contact"), "gap", gap);
-  }
+    keep(keyOf(tree_, "contact"), "gap", shortNumber(before.contact.gap, 17));
   for (std::size_t k = 0; k < entriesIn(tree_, "cloths") && k < after.cloths.size(); ++k)
   {
     const ClothConfig& cloth = after.cloths[k];
@@ -417,8 +394,8 @@ SceneConfig editedScene(const SceneConfig& scene, const SceneEdit& edit)
     edited = sceneOfTree(text.tree(), file, scene.directory);
   if (edit.kind == SceneEdit::Kind::set_parameter && edited.wind_topic && edited.wind != scene.wind)
     throw SceneError(
-        "~set_parameter: wind.velocity: messages on the topic wind set the wind of this scene (wind: "
-        "{topic: true}); publish there instead");
+        "~set_parameter: wind.velocity: messages on the topic wind set the wind of this scene (wind: {topic: true}); "
+        "publish there instead");
   edited.source = writeYaml(text.tree());
   return edited;
 }

@@ -13,10 +13,10 @@ namespace {
 /// What the scene says of a chain; see the meanings of its keys.
 struct Chain
 {
-  std::string name;
-  int links, edges;
-  double radius, opening, spacing;   ///< [m], [rad], [m]
-  Eigen::Vector3d from, along, up;   ///< [m], unit vectors
+  std::string name = "chain";
+  int links = 7, edges = 30;
+  double radius = 0.05, opening = 0.0, spacing = 0.0;   ///< [m], [rad], [m]
+  Eigen::Vector3d from{0, 0, 0}, along, up;             ///< [m], unit vectors
 };
 
 /// `motions`: of the outermost points of the first and the last link. `rod`: what all links have in common.
@@ -65,38 +65,30 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
 {
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const std::string name =
-      map.get("name", "Name of the chain; its links are NAME_0, NAME_1, ... Without the key: chain.")
-          .name()
-          .value_or("chain");
-  const int links = map.get("links", "Number of links. Without the key: 7.").integer(1, 10'000).value_or(7);
-  const double radius =
-      map.get("radius", "Radius of each link, to the centreline of its wire. Without the key: 0.05 m.")
-          .number(kGeneratorLength)
-          .value_or(0.05);
-  const YamlCursor
-      at_opening = map.get("opening", "Angle of the gap in each link. Without the key: 0, closed links."),
-      at_spacing = map.get(
-          "spacing",
-          "Distance of the centres of two neighbouring links, more than the link's radius plus the wire's and less "
-          "than twice their difference. Without the key: twice the link's radius minus four times the wire's."),
-      at_up = map.get("up",
-                      "Direction about which the links are turned, not along `direction`. Without the key: [0, 0, 1].");
-  const double opening = at_opening.number(Range::closed(0, 0.5 * M_PI, "rad")).value_or(0.0);
-  const int edges =
-      map.get("edges", "Number of edges of each link. Without the key: 30.").integer(3, 10'000).value_or(30);
-  const Eigen::Vector3d from = map.get("from", "Centre of the first link. Without the key: [0, 0, 0].")
-                                   .vector3(kGeneratorPosition)
-                                   .value_or(Eigen::Vector3d::Zero());
-  const Eigen::Vector3d along = readDirection(
-      map.get("direction", "Direction of the chain. Without the key: [1, 0, 0]."), Eigen::Vector3d::UnitX());
+  Chain chain;
+  map.getName(chain.name, "Name of the chain; its links are NAME_0, NAME_1, ... Without the key: chain.");
+  map.get("links", chain.links, Range::closed(1, 10'000), "Number of links. Without the key: 7.");
+  map.get("radius", chain.radius, kLength,
+          "Radius of each link, to the centreline of its wire. Without the key: 0.05 m.");
+  map.get("opening", chain.opening, Range::closed(0, 0.5 * M_PI, "rad"),
+          "Angle of the gap in each link. Without the key: 0, closed links.");
+  const YamlCursor at_spacing =
+      map.get("spacing",
+              "Distance of the centres of two neighbouring links, more than the link's radius plus the wire's and less "
+              "than twice their difference. Without the key: twice the link's radius minus four times the wire's.");
+  const YamlCursor at_up =
+      map.get("up", "Direction about which the links are turned, not along `direction`. Without the key: [0, 0, 1].");
+  map.get("edges", chain.edges, Range::closed(3, 10'000), "Number of edges of each link. Without the key: 30.");
+  map.get("from", chain.from, kCoordinate, "Centre of the first link. Without the key: [0, 0, 0].");
+  chain.along = readDirection(map.get("direction", "Direction of the chain. Without the key: [1, 0, 0]."),
+                              Eigen::Vector3d::UnitX());
   at_spacing.takes("a number in (R + r, 2 (R - r)) m, with the radius R of a link and r of the wire");
-  const Eigen::Vector3d up = readDirection(at_up, Eigen::Vector3d::UnitZ());
+  chain.up = readDirection(at_up, Eigen::Vector3d::UnitZ());
   RodConfig rod;
-  rod.name = name;
+  rod.name = chain.name;
   const YamlCursor at_section =
       map.get("cross_section", "Cross-section of the wire. Without the key: a radius of 0.005 m.");
-  rod.cross_section = readCrossSection(at_section, edges);
+  rod.cross_section = readCrossSection(at_section, chain.edges);
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
   const Motion motions[2] = {readMotion(map.get("start_motion",
@@ -112,19 +104,19 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
     for (double r : *radii)
       thickness = std::max(thickness, r);
   // Closer, links two apart meet; farther, neighbours do.
-  const Range allowed = Range::between(radius + thickness, 2 * (radius - thickness), "m");
-  const double spacing = at_spacing.number(allowed).value_or(2 * radius - 4 * thickness);
+  const Range allowed = Range::between(chain.radius + thickness, 2 * (chain.radius - thickness), "m");
+  chain.spacing = at_spacing.number(allowed).value_or(2 * chain.radius - 4 * thickness);
   map.finish();
-  if (up.cross(along).norm() < 1e-6)
+  if (chain.up.cross(chain.along).norm() < 1e-6)
     at_up.problem("is along direction; must point away from it");
-  if (at.problems().size() == before && !allowed.holds(spacing))
+  if (at.problems().size() == before && !allowed.holds(chain.spacing))
   {
     at.problem("the wire is too thick: its radius " + shortNumber(thickness) +
-               " m must be less than a fifth of the links' radius " + shortNumber(radius) + " m");
+               " m must be less than a fifth of the links' radius " + shortNumber(chain.radius) + " m");
   }
-  if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * links))
+  if (at.problems().size() != before || !context.claim(at, (chain.edges + 1.0) * chain.links))
     return;
-  makeLinks({name, links, edges, radius, opening, spacing, from, along, up}, motions, rod, at, out);
+  makeLinks(chain, motions, rod, at, out);
 }
 
 }   // namespace slender

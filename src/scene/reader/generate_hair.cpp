@@ -16,18 +16,16 @@ ObstacleConfig readHead(YamlMap& map, const ReadContext& context)
 {
   YamlMap head_map(map.get("head", "The ball on which the strands grow, an obstacle. The roots follow its motion."));
   ObstacleConfig head;
-  head.name = head_map.get("name", "Name of the obstacle. Without the key: head.").name().value_or("head");
-  head.pose.position = head_map.get("center", "Centre of the ball at the start. Without the key: [0, 0, 0].")
-                           .vector3(kGeneratorPosition)
-                           .value_or(Eigen::Vector3d::Zero());
-  const double head_radius =
-      head_map.get("radius", "Radius of the ball. Without the key: 0.1 m.").number(kGeneratorLength).value_or(0.1);
-  head.shape = Sphere{head_radius};
-  assign(head.friction, head_map
-                            .get("friction",
-                                 "Coefficient of friction. Between two objects the geometric mean of both coefficients "
-                                 "counts. Without the key: that of the other object.")
-                            .number(Range::closed(0, 100)));
+  head.name = "head";
+  Sphere ball{0.1};
+  head_map.getName(head.name, "Name of the obstacle. Without the key: head.");
+  head_map.get("center", head.pose.position, kCoordinate,
+               "Centre of the ball at the start. Without the key: [0, 0, 0].");
+  head_map.get("radius", ball.radius, kLength, "Radius of the ball. Without the key: 0.1 m.");
+  head.shape = ball;
+  head_map.get("friction", head.friction, Range::closed(0, 100),
+               "Coefficient of friction. Between two objects the geometric mean of both coefficients counts. Without "
+               "the key: that of the other object.");
   const YamlCursor motion = head_map.get("motion", "How the ball moves. Without the key: it stands.");
   assign(head.motion, readSolidMotion(motion, context, false));
   head_map.finish();
@@ -55,25 +53,18 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
 {
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const std::string name =
-      map.get("name", "Name of the hair; strands are NAME_0, ... Without the key: hair.").name().value_or("hair");
-  Dice dice(map.get("seed", "Seed of the random places and lengths. Without the key: 1.")
-                .integer(0, 1'000'000'000)
-                .value_or(1));
-  const int strands = map.get("strands", "Number of strands. Without the key: 100.").integer(1, 100'000).value_or(100);
-  const int edges =
-      map.get("edges", "Number of edges of each strand. Without the key: 49.").integer(2, 10'000).value_or(49);
-  const double length = map.get("length", "Length of the longest strand. Without the key: 0.15 m.")
-                            .number(kGeneratorLength)
-                            .value_or(0.15);
-  const double variation =
-      map.get("length_variation", "Share of the length by which strands may be shorter. Without the key: 0.")
-          .number(Range::closed(0, 0.9))
-          .value_or(0.0);
-  const double cap =
-      map.get("cap", "Angle from `up` within which strands grow on the ball. Without the key: pi/2, half of the ball.")
-          .number(Range::above(0, M_PI, "rad"))
-          .value_or(0.5 * M_PI);
+  std::string name = "hair";
+  int seed = 1, strands = 100, edges = 49;
+  double length = 0.15, variation = 0.0, cap = 0.5 * M_PI, curl_radius = 0.004, curl_pitch = 0.02;
+  map.getName(name, "Name of the hair; strands are NAME_0, ... Without the key: hair.");
+  map.get("seed", seed, Range::closed(0, 1'000'000'000), "Seed of the random places and lengths. Without the key: 1.");
+  map.get("strands", strands, Range::closed(1, 100'000), "Number of strands. Without the key: 100.");
+  map.get("edges", edges, Range::closed(2, 10'000), "Number of edges of each strand. Without the key: 49.");
+  map.get("length", length, kLength, "Length of the longest strand. Without the key: 0.15 m.");
+  map.get("length_variation", variation, Range::closed(0, 0.9),
+          "Share of the length by which strands may be shorter. Without the key: 0.");
+  map.get("cap", cap, Range::above(0, M_PI, "rad"),
+          "Angle from `up` within which strands grow on the ball. Without the key: pi/2, half of the ball.");
   const Eigen::Vector3d up = readDirection(
       map.get("up", "Direction of the middle of the hair. Without the key: [0, 0, 1]."), Eigen::Vector3d::UnitZ());
 
@@ -82,10 +73,8 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
       "curl",
       "Natural curl of the strands, helices about their straight axes. Without the key the strands are straight.");
   YamlMap curl(at_curl);
-  const double curl_radius =
-      curl.get("radius", "Radius of the helix. Without the key: 0.004 m.").number(kGeneratorLength).value_or(0.004);
-  const double curl_pitch =
-      curl.get("pitch", "Rise of the helix per turn. Without the key: 0.02 m.").number(kGeneratorLength).value_or(0.02);
+  curl.get("radius", curl_radius, kLength, "Radius of the helix. Without the key: 0.004 m.");
+  curl.get("pitch", curl_pitch, kLength, "Rise of the helix per turn. Without the key: 0.02 m.");
   curl.finish();
 
   RodConfig rod;
@@ -103,6 +92,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
 
   const double root_distance =
       std::get<Sphere>(head.shape).radius + 2 * std::max(rod.cross_section.a[0], rod.cross_section.b[0]);
+  Dice dice(seed);
   const Eigen::Vector3d e1 = anyNormal(up), e2 = up.cross(e1);
   for (int k = 0; k < strands; ++k)
   {

@@ -24,8 +24,8 @@ struct Branch
 
 struct TreeShape
 {
-  int vertices = 0, levels = 0, children = 0;
-  double length = 0.0, radius = 0.0, length_ratio = 0.0, radius_ratio = 0.0, incline = 0.0;
+  int vertices = 2158, levels = 3, children = 7;
+  double length = 3.0, radius = 0.05, length_ratio = 0.5, radius_ratio = 0.45, incline = 0.9;
 };
 
 std::vector<Branch> grow(const TreeShape& shape, Dice& dice)
@@ -75,10 +75,10 @@ void shareNodes(std::vector<Branch>& branches, int vertices)
 /// What the scene says of a tree.
 struct Tree
 {
-  std::string name;
+  std::string name = "tree";
   TreeShape shape;
-  double taper = 0.0, joint_density = 0.0;
-  Eigen::Vector3d root, up;
+  double taper = 0.4, joint_density = 0.0;
+  Eigen::Vector3d root{0, 0, 0}, up;
   RodConfig rod;   ///< of which each branch is a copy
   Motion motion;
 };
@@ -86,48 +86,31 @@ struct Tree
 Tree readTree(YamlMap& map, const ReadContext& context)
 {
   Tree tree;
-  tree.name =
-      map.get("name", "Name of the tree; its branches are NAME_0 (the trunk), NAME_1, ... Without the key: tree.")
-          .name()
-          .value_or("tree");
+  map.getName(tree.name, "Name of the tree; its branches are NAME_0 (the trunk), NAME_1, ... Without the key: tree.");
   TreeShape& shape = tree.shape;
-  shape.vertices = map.get("vertices", "Number of nodes of all branches together. Without the key: 2158.")
-                       .integer(least_nodes, max_edges)
-                       .value_or(2158);
-  shape.levels =
-      map.get("levels", "Number of levels: 1 is a trunk alone. Without the key: 3.").integer(1, 6).value_or(3);
-  shape.children =
-      map.get("children", "Number of side branches of each branch. Without the key: 7.").integer(1, 30).value_or(7);
-  shape.length = map.get("length", "Length of the trunk. Without the key: 3 m.").number(kGeneratorLength).value_or(3.0);
-  shape.radius = map.get("radius", "Radius of the trunk at its root. Without the key: 0.05 m.")
-                     .number(Range::above(0, 10, "m"))
-                     .value_or(0.05);
+  map.get("vertices", shape.vertices, Range::closed(least_nodes, max_edges),
+          "Number of nodes of all branches together. Without the key: 2158.");
+  map.get("levels", shape.levels, Range::closed(1, 6), "Number of levels: 1 is a trunk alone. Without the key: 3.");
+  map.get("children", shape.children, Range::closed(1, 30),
+          "Number of side branches of each branch. Without the key: 7.");
+  map.get("length", shape.length, kLength, "Length of the trunk. Without the key: 3 m.");
+  map.get("radius", shape.radius, Range::above(0, 10, "m"),
+          "Radius of the trunk at its root. Without the key: 0.05 m.");
   const Range ratio = Range::above(0, 1);
-  shape.length_ratio =
-      map.get("length_ratio", "Length of a side branch over that of its parent, about. Without the key: 0.5.")
-          .number(ratio)
-          .value_or(0.5);
-  shape.radius_ratio =
-      map.get("radius_ratio", "Radius of a side branch over that of its parent. Without the key: 0.45.")
-          .number(ratio)
-          .value_or(0.45);
-  shape.incline = map.get("angle", "Angle between a side branch and its parent, about. Without the key: 0.9 rad.")
-                      .number(Range::between(0, 0.5 * M_PI, "rad"))
-                      .value_or(0.9);
-  tree.taper = map.get("taper", "Radius of a branch at its tip over that at its root. Without the key: 0.4.")
-                   .number(ratio)
-                   .value_or(0.4);
-  tree.root = map.get("root", "Position of the root. Without the key: [0, 0, 0].")
-                  .vector3(kGeneratorPosition)
-                  .value_or(Eigen::Vector3d::Zero());
+  map.get("length_ratio", shape.length_ratio, ratio,
+          "Length of a side branch over that of its parent, about. Without the key: 0.5.");
+  map.get("radius_ratio", shape.radius_ratio, ratio,
+          "Radius of a side branch over that of its parent. Without the key: 0.45.");
+  map.get("angle", shape.incline, Range::between(0, 0.5 * M_PI, "rad"),
+          "Angle between a side branch and its parent, about. Without the key: 0.9 rad.");
+  map.get("taper", tree.taper, ratio, "Radius of a branch at its tip over that at its root. Without the key: 0.4.");
+  map.get("root", tree.root, kCoordinate, "Position of the root. Without the key: [0, 0, 0].");
   tree.up = readDirection(map.get("direction", "Direction of the trunk. Without the key: [0, 0, 1]."),
                           Eigen::Vector3d::UnitZ());
   readTraits(map, tree.rod);
-  tree.joint_density =
-      map.get("joint_density",
-              "Mass per volume of the balls that join branches. Without the key: that of the branches.")
-          .number(Range::above(0, 1e6, "kg/m^3"))
-          .value_or(tree.rod.material.density);
+  tree.joint_density = tree.rod.material.density;
+  map.get("joint_density", tree.joint_density, Range::above(0, 1e6, "kg/m^3"),
+          "Mass per volume of the balls that join branches. Without the key: that of the branches.");
   tree.motion =
       readMotion(map.get("motion", "How the root moves, which the grasp NAME_root holds. Without the key: fixed."),
                  context, false);
@@ -169,9 +152,9 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   Tree tree = readTree(map, context);
   const TreeShape& shape = tree.shape;
   const YamlCursor at_vertices = map.find("vertices");
-  const auto seed = map.get("seed", "Seed of the random places and angles of the branches. Without the key: 1.")
-                        .integer(0, 1'000'000'000)
-                        .value_or(1);
+  int seed = 1;
+  map.get("seed", seed, Range::closed(0, 1'000'000'000),
+          "Seed of the random places and angles of the branches. Without the key: 1.");
   map.finish();
   if (at.problems().size() != before)
     return;
@@ -182,8 +165,9 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   const YamlCursor& place = at_vertices.present() ? at_vertices : at;
   if (shape.vertices < least_nodes * count)   // before they grow: 6 levels of 30 children are 750 million
   {
-    return place.problem("is too few for " + std::to_string(count) + " branches; must be at least " +
-                         std::to_string(least_nodes * count));
+    place.problem("is too few for " + std::to_string(count) + " branches; must be at least " +
+                  std::to_string(least_nodes * count));
+    return;
   }
   if (!context.claim(place, shape.vertices))
     return;
@@ -207,9 +191,10 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       const int edge = std::max({static_cast<int>(branch.at * (parent.nodes - 1)), last_joint[branch.parent] + 2, 1});
       if (edge > parent.nodes - 3)
       {
-        return place.problem("gives " + tree.name + "_" + std::to_string(branch.parent) + " too few (" +
-                             std::to_string(parent.nodes) + ") for its " + std::to_string(shape.children) +
-                             " children; raise it, or lower levels or children");
+        place.problem("gives " + tree.name + "_" + std::to_string(branch.parent) + " too few (" +
+                      std::to_string(parent.nodes) + ") for its " + std::to_string(shape.children) +
+                      " children; raise it, or lower levels or children");
+        return;
       }
       last_joint[branch.parent] = edge;
       leaveParent(branch, line[edge], line[edge + 1]);

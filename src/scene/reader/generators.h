@@ -26,9 +26,6 @@ private:
   std::mt19937_64 engine_;
 };
 
-inline const Range kGeneratorLength = Range::above(0, kMaxCoordinate, "m");
-inline const Range kGeneratorPosition = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
-
 /// A direction of the scene file as a unit vector.
 Eigen::Vector3d readDirection(const YamlCursor& at, const Eigen::Vector3d& otherwise);
 

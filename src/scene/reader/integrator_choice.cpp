@@ -11,7 +11,7 @@ namespace {
 void checkClothTime(YamlMap& map, SceneConfig& scene)
 {
   const YamlCursor time = map.find("time");
-  if (!YamlMap(time).has("integrator"))
+  if (!time.find("integrator").present())
   {
     if (scene.time.integrator != Integrator::implicit_euler && !(scene.rods.empty() && scene.bodies.empty()))
     {
@@ -27,12 +27,10 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
   else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::tr_bdf2 &&
            scene.time.integrator != Integrator::imex && scene.time.integrator != Integrator::symplectic_euler)
   {
-    YamlMap(time)
-        .find("integrator")
-        .problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
+    time.find("integrator").problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
   }
-  if (YamlMap(time).has("spectral_radius"))
-    YamlMap(time).find("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
+  if (time.find("spectral_radius").present())
+    time.find("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
   if (scene.start.equilibrium)
   {
     for (const ClothConfig& cloth : scene.cloths)
@@ -55,7 +53,10 @@ void checkThreadTime(YamlMap& map, const SceneConfig& scene)
   YamlMap time(map.find("time"));
   const bool alone = scene.rods.empty() && scene.bodies.empty() && scene.cloths.empty();
   const auto refuse = [&](const YamlCursor& at, const std::string& problem, const std::string& warning) {
-    alone ? at.problem(problem) : at.warning(warning);
+    if (alone)
+      at.problem(problem);
+    else
+      at.warning(warning);
   };
   if (time.has("integrator") && scene.time.integrator != Integrator::implicit_euler)
   {
@@ -112,7 +113,7 @@ void checkContactTime(const YamlCursor& time, SceneConfig& scene)
   const auto hits = [&](const BodyConfig& body) { return hitsSomething(scene, body); };
   const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), touchesSomething) ||
                        std::any_of(scene.bodies.begin(), scene.bodies.end(), hits);
-  if (touches && !YamlMap(time).has("integrator"))
+  if (touches && !time.find("integrator").present())
   {
     // methods of second order carry an impact's velocity on and bounce
     scene.time.integrator = Integrator::implicit_euler;
@@ -125,16 +126,14 @@ void checkContactTime(const YamlCursor& time, SceneConfig& scene)
   else if (touches && scene.time.integrator != Integrator::implicit_euler &&
            scene.time.integrator != Integrator::symplectic_euler)
   {
-    YamlMap(time)
-        .find("integrator")
+    time.find("integrator")
         .warning(
             "of second order carries the velocity before an impact beyond it, so that a rod or body may bounce higher "
             "than it fell: use implicit_euler, the default with contact, where something is hit");
   }
   if (touches && scene.time.integrator == Integrator::symplectic_euler)
   {
-    YamlMap(time)
-        .find("integrator")
+    time.find("integrator")
         .problem(
             "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, bdf2 or tr_bdf2, "
             "or nothing may have contact (bodies: contact: false)");
@@ -155,9 +154,7 @@ void chooseIntegrator(YamlMap& map, const YamlCursor& time, SceneConfig& scene)
   if (scene.time.integrator == Integrator::imex &&
       !(scene.rods.empty() && scene.threads.empty() && scene.bodies.empty()))
   {
-    YamlMap(time)
-        .find("integrator")
-        .problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
+    time.find("integrator").problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
   }
 }
 

@@ -9,7 +9,6 @@
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "yaml_cursor.h"
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -18,13 +17,6 @@ namespace {
 constexpr double quaternion_slack = 0.01;
 constexpr double largest_turn = 0.99 * M_PI;   // [rad] between two samples
 
-std::string trim(const std::string& text)
-{
-  const auto first = text.find_first_not_of(" \t\r");
-  const auto last = text.find_last_not_of(" \t\r");
-  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
-}
-
 std::vector<std::string> splitCells(const std::string& line)
 {
   std::vector<std::string> cells;
@@ -32,7 +24,7 @@ std::vector<std::string> splitCells(const std::string& line)
   while (true)
   {
     const std::size_t comma = line.find(',', begin);
-    cells.push_back(trim(line.substr(begin, comma == std::string::npos ? comma : comma - begin)));
+    cells.push_back(trimmed(line.substr(begin, comma == std::string::npos ? comma : comma - begin)));
     if (comma == std::string::npos)
       return cells;
     begin = comma + 1;
@@ -69,7 +61,7 @@ void readTable(const std::string& path, const std::vector<std::string>& columns,
   bool first = true;
   for (int count = 1; std::getline(file, line); ++count)
   {
-    line = trim(line);
+    line = trimmed(line);
     if (line.empty() || line[0] == '#')
       continue;
     const auto cells = splitCells(line);

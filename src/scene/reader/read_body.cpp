@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <stdexcept>
-#include <tuple>
 
 #include "read_parts.h"
 #include "slender_sim/rod/rigid_body.h"
@@ -9,14 +8,10 @@ namespace slender {
 
 namespace {
 
-const Range inertia_entry = Range::closed(-1e15, 1e15, "kg m^2");
-
 /// [Ixx, Iyy, Izz] or the rows of a symmetric matrix.
 std::optional<Eigen::Matrix3d> readInertia(const YamlCursor& at)
 {
   at.takes("[Ixx, Iyy, Izz] of numbers in (0, 1e+15] kg m^2, or three rows of a symmetric matrix");
-  if (!at.present())
-    return std::nullopt;
   const auto rows = at.items(3, 3);
   if (rows.empty())
     return std::nullopt;
@@ -29,30 +24,26 @@ std::optional<Eigen::Matrix3d> readInertia(const YamlCursor& at)
   }
   for (int i = 0; i < 3; ++i)
   {
-    const auto row = rows[i].vector3(inertia_entry);
+    const auto row = rows[i].vector3(Range::closed(-1e15, 1e15, "kg m^2"));
     if (!row)
       return std::nullopt;
     inertia.row(i) = *row;
   }
   if ((inertia - inertia.transpose()).norm() > 1e-9 * inertia.norm())
-  {
-    at.problem("must be symmetric");
-    return std::nullopt;
-  }
+    return at.problem("must be symmetric");
   return Eigen::Matrix3d(0.5 * (inertia + inertia.transpose()));
 }
 
 /// Mass and inertia from the file or from the shape; moves the body's frame to the shape's centre of mass.
 void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
 {
-  const YamlCursor mass = map.get(
-                       "mass",
-                       "Mass of the body. Give either `mass` or `density`; bodies with a given motion need neither."),
-                   density = map.get("density", "Mass per volume of `shape`, from which mass and inertia follow."),
-                   at_inertia =
-                       map.get("inertia",
-                               "Moments of inertia about the centre of mass in the body's axes: [Ixx, Iyy, Izz], or "
-                               "the rows of a symmetric matrix. Without the key: those of the shape.");
+  const YamlCursor mass =
+      map.get("mass", "Mass of the body. Give either `mass` or `density`; bodies with a given motion need neither.");
+  const YamlCursor density = map.get("density", "Mass per volume of `shape`, from which mass and inertia follow.");
+  const YamlCursor at_inertia =
+      map.get("inertia",
+              "Moments of inertia about the centre of mass in the body's axes: [Ixx, Iyy, Izz], or the rows of a "
+              "symmetric matrix. Without the key: those of the shape.");
   const std::size_t before = mass.problems().size();
   const auto kilograms = mass.number(Range::above(0, 1e9, "kg"));
   const auto per_volume = density.number(Range::above(0, 1e6, "kg/m^3"));
@@ -67,8 +58,7 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
     at_inertia.problem("is missing; a body without a shape needs [Ixx, Iyy, Izz] or three rows, in kg m^2");
   if (mass.problems().size() != before || (shape_given && !body.shape))
     return;
-  try
-  {
+  const bool good = (density.present() ? density : mass).attempt([&] {
     if (kilograms && inertia)
     {
       body.mass = *kilograms;
@@ -84,38 +74,33 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
         body.pose.position = body.pose * solid.center;
       }
     }
-  }
-  catch (const std::invalid_argument& error)
-  {
-    (density.present() ? density : mass).problem(error.what());
+  });
+  if (!good)
     return;
-  }
   assign(body.inertia, inertia);
-  try
-  {
-    RigidBodyModel model;
-    model.name = body.name;
-    model.mass = body.mass;
-    model.inertia = body.inertia;
-    checkBody(model);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    (at_inertia.present() ? at_inertia : mass.present() ? mass : density).problem(error.what());
-  }
+  (at_inertia.present() ? at_inertia
+   : mass.present()     ? mass
+                        : density)
+      .attempt([&] {
+        RigidBodyModel model;
+        model.name = body.name;
+        model.mass = body.mass;
+        model.inertia = body.inertia;
+        checkBody(model);
+      });
 }
 
-void readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods, std::vector<WeldConfig>& welds)
+std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods)
 {
   YamlMap map(at);
-  const YamlCursor at_rod = map.require("rod", "Name of the rod that the body holds."),
-                   edge = map.require("edge",
+  const YamlCursor at_rod = map.require("rod", "Name of the rod that the body holds.");
+  const YamlCursor edge = map.require("edge",
                                       "Edge of the rod that the body holds; a negative index counts from the end. An "
                                       "end edge of an open rod, 0 or -1, means the section at the end node.");
   map.finish();
   const auto name = at_rod.text();
   if (!name)
-    return;
+    return std::nullopt;
   const auto found =
       std::find_if(rods.begin(), rods.end(), [&](const ReadRod& part) { return part.config.name == *name; });
   if (found == rods.end())
@@ -123,23 +108,19 @@ void readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods, std::vecto
     std::vector<std::string> names;
     for (const ReadRod& part : rods)
       names.push_back(part.config.name);
-    const std::string nearest = nearestWord(*name, names);
-    names.resize(std::min<std::size_t>(names.size(), 10));
-    return at_rod.problem("is no rod of the scene" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
-                          "; it has: " + joinWords(names));
+    return at_rod.problem("is no rod of the scene" + didYouMean(*name, names) + "; it has: " + joinWords(names, 10));
   }
   const int edges = found->edges;
   // no edges: reported where the rod is
   const auto index = edges > 0 ? edge.integer(-edges, edges - 1) : std::nullopt;
   if (!index)
-    return;
+    return std::nullopt;
   const std::size_t before = edge.problems().size();
-  WeldConfig weld;
-  weld.rod = static_cast<int>(found - rods.begin());
   const int held = *index < 0 ? *index + edges : *index;
-  std::tie(weld.first_node, weld.last_node) = nodesOfEdges(edge, held, held, found->config.closed, edges);
-  if (edge.problems().size() == before)
-    welds.push_back(weld);
+  const auto [first, last] = nodesOfEdges(edge, held, held, found->config.closed, edges);
+  return edge.problems().size() == before
+             ? std::optional<WeldConfig>({static_cast<int>(found - rods.begin()), first, last})
+             : std::nullopt;
 }
 
 BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
@@ -147,72 +128,58 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
   BodyConfig body;
   YamlMap map(at);
   body.name = default_name;
-  assign(body.name, map.get("name",
-                            "Name of the body; bodies and obstacles need different names. Without the key: body if "
-                            "there is one body, otherwise body0, body1, ...")
-                        .name());
+  map.getName(body.name,
+              "Name of the body; bodies and obstacles need different names. Without the key: body if there is one "
+              "body, otherwise body0, body1, ...");
   body.motion = readSolidMotion(
       map.get("motion", "How the body moves. Without the key, or with free, it is simulated: forces move it."), context,
       true);
   const YamlCursor at_pose = map.get("pose",
                                      "Where the shape is at the start. Without the key: at the origin, not turned. Not "
-                                     "with a table of poses, whose first pose it would contradict."),
-                   at_shape = map.get(
-                       "shape",
-                       "Shape of the body: give one. Without the key the body has no shape, and touches nothing.");
+                                     "with a table of poses, whose first pose it would contradict.");
+  const YamlCursor at_shape =
+      map.get("shape", "Shape of the body: give one. Without the key the body has no shape, and touches nothing.");
   std::optional<Pose> pose = readPose(at_pose);
   body.shape = readShape(at_shape, context, pose);
-  if (body.motion)
+  if (const auto* table = body.motion ? std::get_if<TableMotion>(&*body.motion) : nullptr)
   {
-    if (const auto* table = std::get_if<TableMotion>(&*body.motion))
-    {
-      if (pose)
-        (at_pose.present() ? at_pose : at).problem("there is a table of poses as well; the body starts at its first");
-      pose = table->poses.evaluate(table->poses.firstTime());
-    }
+    if (pose)
+      (at_pose.present() ? at_pose : at).problem("there is a table of poses as well; the body starts at its first");
+    pose = table->poses.evaluate(table->poses.firstTime());
   }
   assign(body.pose, pose);
   readMass(map, at_shape.present(), body);
   YamlMap velocity(map.get("velocity", "Velocity of a simulated body at the start. Without the key: at rest."));
-  assign(body.velocity.linear, velocity.get("linear", "Velocity of the centre of mass. Without the key: 0.")
-                                   .vector3(Range::closed(-1e5, 1e5, "m/s")));
-  assign(body.velocity.angular, velocity.get("angular", "Angular velocity in world axes. Without the key: 0.")
-                                    .vector3(Range::closed(-1e5, 1e5, "rad/s")));
+  velocity.get("linear", body.velocity.linear, Range::closed(-1e5, 1e5, "m/s"),
+               "Velocity of the centre of mass. Without the key: 0.");
+  velocity.get("angular", body.velocity.angular, Range::closed(-1e5, 1e5, "rad/s"),
+               "Angular velocity in world axes. Without the key: 0.");
   velocity.finish();
   if (velocity.at().present() && body.motion)
     velocity.at().problem("the body's motion is given; only free bodies start with a velocity");
-  assign(body.gravity,
-         map.get("gravity", "Whether gravity acts on the simulated body. Without the key: true.").boolean());
-  assign(body.force, map.get("force", "Constant force at the centre of mass, in world axes. Without the key: none.")
-                         .vector3(Range::closed(-1e12, 1e12, "N")));
-  assign(body.torque, map.get("torque", "Constant torque, in world axes. Without the key: none.")
-                          .vector3(Range::closed(-1e12, 1e12, "N m")));
+  map.get("gravity", body.gravity, "Whether gravity acts on the simulated body. Without the key: true.");
+  map.get("force", body.force, Range::closed(-1e12, 1e12, "N"),
+          "Constant force at the centre of mass, in world axes. Without the key: none.");
+  map.get("torque", body.torque, Range::closed(-1e12, 1e12, "N m"),
+          "Constant torque, in world axes. Without the key: none.");
   YamlMap damping(map.get("damping", "Damping of the motion of a simulated body. Without the key: none."));
-  assign(body.linear_damping, damping
-                                  .get("linear",
-                                       "Rate of the damping of the velocity: the force is -linear times mass times "
-                                       "velocity. Without the key: 0.")
-                                  .number(Range::closed(0, 1e6, "1/s")));
-  assign(body.angular_damping, damping
-                                   .get("angular",
-                                        "Rate of the damping of the rotation: the torque is -angular times inertia "
-                                        "times angular velocity. Without the key: 0.")
-                                   .number(Range::closed(0, 1e6, "1/s")));
+  damping.get(
+      "linear", body.linear_damping, Range::closed(0, 1e6, "1/s"),
+      "Rate of the damping of the velocity: the force is -linear times mass times velocity. Without the key: 0.");
+  damping.get("angular", body.angular_damping, Range::closed(0, 1e6, "1/s"),
+              "Rate of the damping of the rotation: the torque is -angular times inertia times angular velocity. "
+              "Without the key: 0.");
   damping.finish();
-  assign(body.contact,
-         map.get("contact",
-                 "Whether the shape touches rods, threads and cloths that have contact. A simulated body also touches "
-                 "obstacles and other bodies. Without the key: true.")
-             .boolean());
-  body.friction = map.get("friction",
-                          "Coefficient of friction. Between two objects the geometric mean of both coefficients "
-                          "counts. Without the key: that of the other object, and 0.3 against obstacles and bodies.")
-                      .number(Range::closed(0, 100));
+  map.get("contact", body.contact,
+          "Whether the shape touches rods, threads and cloths that have contact. A simulated body also touches "
+          "obstacles and other bodies. Without the key: true.");
+  map.get("friction", body.friction, Range::closed(0, 100),
+          "Coefficient of friction. Between two objects the geometric mean of both coefficients "
+          "counts. Without the key: that of the other object, and 0.3 against obstacles and bodies.");
   body.broadcast_tf = !body.motion;
-  assign(body.broadcast_tf, map.get("broadcast_tf",
-                                    "Whether nodes publish the body's frame on tf. Without the key: true for simulated "
-                                    "bodies, false for bodies with a given motion.")
-                                .boolean());
+  map.get("broadcast_tf", body.broadcast_tf,
+          "Whether nodes publish the body's frame on tf. Without the key: true for simulated bodies, false for bodies "
+          "with a given motion.");
   map.get("welds",
           "Edges of rods that the body holds: they keep the place and the orientation that they have in the body at "
           "the start. Without the key: none.");   // read where the rods are known
@@ -234,11 +201,9 @@ void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<R
     if (overlaps(grasp.first_node, grasp.last_node))
       return report("grasp " + grasp.name, grasp.first_node, grasp.last_node);
   for (const BodyConfig& body : bodies)
-  {
     for (const WeldConfig& other : body.welds)
       if (other.rod == weld.rod && overlaps(other.first_node, other.last_node))
         return report("a weld of body " + body.name, other.first_node, other.last_node);
-  }
 }
 
 }   // namespace
@@ -246,23 +211,16 @@ void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<R
 std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods)
 {
   std::vector<BodyConfig> bodies;
-  if (!at.present())
-    return bodies;
   const auto entries = at.items(0, 100'000);
   for (std::size_t k = 0; k < entries.size(); ++k)
   {
     bodies.push_back(readBody(entries[k], context, entries.size() == 1 ? "body" : "body" + std::to_string(k)));
-    const YamlCursor welds = YamlMap(entries[k]).find("welds");
-    if (!welds.present())
-      continue;
-    for (const YamlCursor& item : welds.items())
+    for (const YamlCursor& item : entries[k].find("welds").items())
     {
-      std::vector<WeldConfig> weld;
-      readWeld(item, rods, weld);
-      if (!weld.empty())
+      if (const auto weld = readWeld(item, rods))
       {
-        checkWeld(item, weld[0], rods, bodies);
-        bodies.back().welds.push_back(weld[0]);
+        checkWeld(item, *weld, rods, bodies);
+        bodies.back().welds.push_back(*weld);
       }
     }
   }

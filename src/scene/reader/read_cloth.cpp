@@ -16,19 +16,13 @@ void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
   YamlMap map(at.sharesKeysOf("cloths.N.plasticity"));
   if (!at.present())
     return;
-  assign(cloth.plasticity.yield_curvature,
-         map.require(
-                "yield_curvature",
-                "Largest elastic deviation of a crease's curvature. What is beyond it stays: it moves the rest angle.")
-             .number(Range::closed(0, 1e9, "1/m")));
-  assign(cloth.plasticity.hardening, map.get("hardening",
-                                             "How creases get stiffer as they flow: by exp(hardening times plastic "
-                                             "curvature). Negative: softer. Without the key: 0.")
-                                         .number(Range::closed(-1e6, 1e6, "m")));
-  assign(
-      cloth.plasticity.creep_time,
-      map.get("creep_time", "Time in which all but 1/e of what is beyond the yield flows. Without the key: 0, at once.")
-          .number(Range::closed(0, 1e9, "s")));
+  map.require("yield_curvature", cloth.plasticity.yield_curvature, Range::closed(0, 1e9, "1/m"),
+              "Largest elastic deviation of a crease's curvature. What is beyond it stays: it moves the rest angle.");
+  map.get("hardening", cloth.plasticity.hardening, Range::closed(-1e6, 1e6, "m"),
+          "How creases get stiffer as they flow: by exp(hardening times plastic curvature). Negative: softer. Without "
+          "the key: 0.");
+  map.get("creep_time", cloth.plasticity.creep_time, Range::closed(0, 1e9, "s"),
+          "Time in which all but 1/e of what is beyond the yield flows. Without the key: 0, at once.");
   map.finish();
   if (cloth.bending != BendingModel::hinge)
   {
@@ -42,12 +36,12 @@ Aerodynamics readAerodynamics(const YamlCursor& at)
 {
   Aerodynamics air;
   YamlMap map(at.sharesKeysOf("cloths.N.aerodynamics"));
-  assign(air.air_density, map.get("air_density", "Density of the air. Without the key: 1.2 kg/m^3.")
-                              .number(Range::above(0, 1e5, "kg/m^3")));
-  assign(air.drag, map.get("drag", "Drag coefficient C_D; a plate across the flow has about 1.2. Without the key: 0.")
-                       .number(Range::closed(0, 1e3)));
-  assign(air.lift, map.get("lift", "Lift coefficient C_L; the lift is largest at 45 degrees. Without the key: 0.")
-                       .number(Range::closed(0, 1e3)));
+  map.get("air_density", air.air_density, Range::above(0, 1e5, "kg/m^3"),
+          "Density of the air. Without the key: 1.2 kg/m^3.");
+  map.get("drag", air.drag, Range::closed(0, 1e3),
+          "Drag coefficient C_D; a plate across the flow has about 1.2. Without the key: 0.");
+  map.get("lift", air.lift, Range::closed(0, 1e3),
+          "Lift coefficient C_L; the lift is largest at 45 degrees. Without the key: 0.");
   map.finish();
   return air;
 }
@@ -58,24 +52,17 @@ void readMembrane(const YamlCursor& at_membrane, ClothConfig& cloth)
   double warp = 300, weft = 300, poisson = 0.0, shear = 100;
   const Range per_width = Range::above(0, 1e9, "N/m");
   YamlMap membrane(at_membrane);
-  assign(warp, membrane.require("warp", "Stiffness along the warp, force per width and strain.").number(per_width));
-  assign(weft, membrane.require("weft", "Stiffness along the weft, force per width and strain.").number(per_width));
-  assign(poisson, membrane.get("poissons_ratio", "Poisson's ratio of the membrane. Without the key: 0.")
-                      .number(Range::between(-1e3, 1e3)));
-  assign(shear, membrane.require("shear", "Stiffness against shear, force per width.").number(per_width));
+  membrane.require("warp", warp, per_width, "Stiffness along the warp, force per width and strain.");
+  membrane.require("weft", weft, per_width, "Stiffness along the weft, force per width and strain.");
+  membrane.get("poissons_ratio", poisson, Range::between(-1e3, 1e3),
+               "Poisson's ratio of the membrane. Without the key: 0.");
+  membrane.require("shear", shear, per_width, "Stiffness against shear, force per width.");
   cloth.warp = readDirection(membrane.get("direction",
                                           "Direction of the warp in the undeformed shape. Without the key: the first "
                                           "side of the grid, or x of a mesh."),
                              cloth.warp);
   membrane.finish();
-  try
-  {
-    cloth.membrane = orthotropicMembrane(warp, weft, poisson, shear);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at_membrane.problem(error.what());
-  }
+  at_membrane.attempt([&] { cloth.membrane = orthotropicMembrane(warp, weft, poisson, shear); });
 }
 
 /// Mass, membrane and bending.
@@ -85,47 +72,43 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
   YamlMap material(
       map.get("material", "Mass and stiffness of the cloth. Without the key: the defaults of the keys in it.")
           .sharesKeysOf("cloths.N.material"));
-  const YamlCursor per_area = material.get("area_density", "Mass per area. Without the key: 0.15 kg/m^2."),
-                   per_volume = material.get(
-                       "density", "Mass per volume, which is multiplied by `thickness`; in place of `area_density`."),
-                   modulus = material.get("youngs_modulus",
-                                          "Young's modulus E. Without the key: 1e6 Pa. Not beside `membrane`.");
-  assign(thickness, material
-                        .get("thickness",
-                             "Thickness h of the cloth, for its stiffness and mass; contact has a thickness of its "
-                             "own. Without the key: 0.0003 m.")
-                        .number(Range::above(0, 1, "m")));
+  const YamlCursor per_area = material.get("area_density", "Mass per area. Without the key: 0.15 kg/m^2.");
+  const YamlCursor per_volume =
+      material.get("density", "Mass per volume, which is multiplied by `thickness`; in place of `area_density`.");
+  const YamlCursor modulus =
+      material.get("youngs_modulus", "Young's modulus E. Without the key: 1e6 Pa. Not beside `membrane`.");
+  material.get("thickness", thickness, Range::above(0, 1, "m"),
+               "Thickness h of the cloth, for its stiffness and mass; contact has a thickness of its own. Without the "
+               "key: 0.0003 m.");
   assign(cloth.area_density, per_area.number(Range::above(0, 1e4, "kg/m^2")));
   if (const auto density = per_volume.number(Range::above(0, 1e6, "kg/m^3")))
     cloth.area_density = *density * thickness;
   if (per_area.present() && per_volume.present())
     per_volume.problem("there is an area_density as well; give one of them");
   assign(youngs_modulus, modulus.number(Range::above(0, 1e13, "Pa")));
-  const YamlCursor ratio =
-      material.get("poissons_ratio", "Poisson's ratio. Without the key: 0.3. Not beside `membrane`.");
-  assign(poissons_ratio, ratio.number(Range::above(-1, 0.5)));
+  const YamlCursor ratio = material.get("poissons_ratio", poissons_ratio, Range::above(-1, 0.5),
+                                        "Poisson's ratio. Without the key: 0.3. Not beside `membrane`.");
   material.finish();
 
   const YamlCursor at_membrane = map.get("membrane",
                                          "Stiffness of an orthotropic cloth in its plane; `bending.modulus` must then "
-                                         "be given, too. Without the key it follows from `material`."),
-                   at_bending = map.get("bending",
-                                        "Stiffness against bending. Without the key: the defaults of the keys in it.");
+                                         "be given, too. Without the key it follows from `material`.");
+  const YamlCursor at_bending =
+      map.get("bending", "Stiffness against bending. Without the key: the defaults of the keys in it.");
   at_membrane.sharesKeysOf("cloths.N.membrane");
   YamlMap bending(at_bending.sharesKeysOf("cloths.N.bending"));
-  assign(cloth.bending, bending
-                            .get("model",
-                                 "Model of bending. isometric is the fastest, for flat shapes at rest; hinge takes any "
-                                 "shape at rest; conforming does not depend on the mesh but is for flat shapes at "
-                                 "rest; none does not bend at all. Without the key: isometric.")
-                            .choice<BendingModel>({{"isometric", BendingModel::isometric_nonconforming},
-                                                   {"conforming", BendingModel::isometric_conforming},
-                                                   {"hinge", BendingModel::hinge},
-                                                   {"none", BendingModel::none}}));
+  bending.get("model", cloth.bending,
+              {{"isometric", BendingModel::isometric_nonconforming},
+               {"conforming", BendingModel::isometric_conforming},
+               {"hinge", BendingModel::hinge},
+               {"none", BendingModel::none}},
+              "Model of bending. isometric is the fastest, for flat shapes at rest; hinge takes any shape at rest; "
+              "conforming does not depend on the mesh but is for flat shapes at rest; none does not bend at all. "
+              "Without the key: isometric.");
   const YamlCursor bending_modulus = bending.get("modulus",
                                                  "Bending stiffness D, moment per width and curvature. Without the "
-                                                 "key: E h^3 / (12 (1 - nu^2)), 0 with model none."),
-                   bending_ratio = bending.get("poissons_ratio",
+                                                 "key: E h^3 / (12 (1 - nu^2)), 0 with model none.");
+  const YamlCursor bending_ratio = bending.get("poissons_ratio",
                                                "Poisson's ratio of bending, for model isometric. Without the key: that "
                                                "of the mesh, about -1/3 on equilateral triangles.");
   cloth.bending_poissons_ratio = bending_ratio.number(Range::between(-1, 1));
@@ -177,10 +160,10 @@ std::vector<int> alongSide(const ClothConfig& cloth, int axis, bool far)
 std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices)
 {
   YamlMap map(at.sharesKeysOf("cloths.N.grasps.NAME.near"));
+  std::optional<double> radius;
   const auto point = map.require("point", "Place near which vertices are held or loaded.").vector3(kCoordinate);
-  const auto radius =
-      map.get("radius", "All vertices within this distance of `point` count. Without the key: the nearest one alone.")
-          .number(Range::above(0, kMaxCoordinate, "m"));
+  map.get("radius", radius, kLength,
+          "All vertices within this distance of `point` count. Without the key: the nearest one alone.");
   map.finish();
   if (!point)
     return {};
@@ -202,10 +185,10 @@ std::vector<int> readHeldVertices(YamlMap& map, const ClothConfig& cloth)
 {
   const YamlCursor list = map.get("vertices",
                                   "Indices of the vertices; a negative index counts from the end, and \"5..9\" is a "
-                                  "range. Give one of `vertices`, `corner`, `edge` and `near`."),
-                   corner = map.get("corner", "Corner of a grid."),
-                   edge = map.get("edge", "All vertices along a side of a grid."),
-                   near = map.get("near", "Vertices near a point, where the cloth starts.");
+                                  "range. Give one of `vertices`, `corner`, `edge` and `near`.");
+  const YamlCursor corner = map.get("corner", "Corner of a grid.");
+  const YamlCursor edge = map.get("edge", "All vertices along a side of a grid.");
+  const YamlCursor near = map.get("near", "Vertices near a point, where the cloth starts.");
   if (list.present() + corner.present() + edge.present() + near.present() != 1)
   {
     if (map.at().isMap())
@@ -270,16 +253,13 @@ std::vector<int> withFaces(const TriangleMesh& mesh, std::vector<int> vertices)
 std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothConfig& cloth)
 {
   std::vector<ClothLoadConfig> loads;
-  if (!at.present())
-    return loads;
   for (const YamlCursor& item : at.items(1, 10'000))
   {
     ClothLoadConfig load;
     YamlMap map(item);
     load.vertices = readHeldVertices(map, cloth);
-    assign(load.force,
-           map.require("force", "Force on each of the vertices; it keeps its size and its direction in the world.")
-               .vector3(Range::closed(-1e15, 1e15, "N")));
+    map.require("force", load.force, Range::closed(-1e15, 1e15, "N"),
+                "Force on each of the vertices; it keeps its size and its direction in the world.");
     map.finish();
     loads.push_back(std::move(load));
   }
@@ -299,22 +279,18 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
     grasp.name = name;
     YamlMap map(entry);
     grasp.vertices = readHeldVertices(map, cloth);
-    assign(grasp.clamp, map.get("clamp",
-                                "Whether the grasp also holds the slope: it then holds all vertices of the faces that "
-                                "touch its vertices. Without the key: false.")
-                            .boolean());
+    map.get("clamp", grasp.clamp,
+            "Whether the grasp also holds the slope: it then holds all vertices of the faces that touch its vertices. "
+            "Without the key: false.");
     if (grasp.clamp)
       grasp.vertices = withFaces(cloth.mesh, grasp.vertices);
     grasp.limits = readGraspLimits(map.get("limits", "Limits of this grasp. Without the key: those of the scene.")
                                        .sharesKeysOf("rods.N.grasps.NAME.limits"));
     grasp.attach = givesOffset(map) ? Attach::section : Attach::initial;
-    assign(
-        grasp.attach,
-        map.get("attach",
-                "Which point the poses of `motion` describe. `initial`: a gripper, which keeps the offset to the "
-                "vertices that it has at its first pose. `frame`: the grasp's frame, with the origin at the mean of "
-                "the vertices and the world's axes at the start. Without the key: initial, but frame with an offset.")
-            .choice<Attach>({{"frame", Attach::section}, {"initial", Attach::initial}}));
+    map.get("attach", grasp.attach, {{"frame", Attach::section}, {"initial", Attach::initial}},
+            "Which point the poses of `motion` describe. `initial`: a gripper, which keeps the offset to the vertices "
+            "that it has at its first pose. `frame`: the grasp's frame, with the origin at the mean of the vertices "
+            "and the world's axes at the start. Without the key: initial, but frame with an offset.");
     grasp.motion =
         readMotion(map.get("motion", "How the held vertices move, as one rigid body. Without the key: fixed."), context,
                    grasp.attach == Attach::section);
@@ -340,12 +316,11 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   cloth.name = default_name;
   cloth.place = at.place();
   YamlMap map(at);
-  assign(cloth.name, map.get("name",
-                             "Name of the cloth, which topics, tables and other keys use. Without the key: cloth if "
-                             "there is one cloth, otherwise cloth0, cloth1, ...")
-                         .name());
-  const YamlCursor grid = map.get("grid", "Rectangle of cloth. Give either `grid` or `mesh`."),
-                   mesh = map.get("mesh", "Mesh of the undeformed cloth from a file. Give either `grid` or `mesh`.");
+  map.getName(cloth.name,
+              "Name of the cloth, which topics, tables and other keys use. Without the key: cloth if there is one "
+              "cloth, otherwise cloth0, cloth1, ...");
+  const YamlCursor grid = map.get("grid", "Rectangle of cloth. Give either `grid` or `mesh`.");
+  const YamlCursor mesh = map.get("mesh", "Mesh of the undeformed cloth from a file. Give either `grid` or `mesh`.");
   if (grid.present() == mesh.present())
   {
     at.problem("must have either grid: {corner: [...], sides: [[...], [...]], cells: N} or mesh: {file: PATH}");
@@ -394,41 +369,28 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
       map.get("aerodynamics",
               "Drag and lift of thin plates in the wind, in addition to `damping.drag`. Without the key: none."));
   YamlMap damping(map.get("damping", "Damping of the cloth. Without the key: none.").sharesKeysOf("cloths.N.damping"));
-  assign(cloth.mass_damping,
-         damping
-             .get("mass",
-                  "Damping of the motion against the world: the force on a mass m is -mass m v. Without the key: 0.")
-             .number(Range::closed(0, 1e6, "1/s")));
-  assign(cloth.stiffness_damping, damping
-                                      .get("stiffness",
-                                           "Damping of deformation (Rayleigh): it acts like the stiffness times this "
-                                           "time, on the rate of the strain. Without the key: 0.")
-                                      .number(Range::closed(0, 1e3, "s")));
-  assign(
-      cloth.drag,
-      damping.get("drag", "Pressure per velocity of the air against the cloth, along the normal. Without the key: 0.")
-          .number(Range::closed(0, 1e6, "N s/m^3")));
+  damping.get("mass", cloth.mass_damping, Range::closed(0, 1e6, "1/s"),
+              "Damping of the motion against the world: the force on a mass m is -mass m v. Without the key: 0.");
+  damping.get("stiffness", cloth.stiffness_damping, Range::closed(0, 1e3, "s"),
+              "Damping of deformation (Rayleigh): it acts like the stiffness times this time, on the rate of the "
+              "strain. Without the key: 0.");
+  damping.get("drag", cloth.drag, Range::closed(0, 1e6, "N s/m^3"),
+              "Pressure per velocity of the air against the cloth, along the normal. Without the key: 0.");
   damping.finish();
   YamlMap solver(map.get("solver", "Settings of the implicit solver of the cloth.").sharesKeysOf("cloths.N.solver"));
-  assign(
-      cloth.solver,
-      solver
-          .get("linear",
-               "Solver of the linear equations: gauss_seidel and conjugate_gradients solve to `tolerance`, cholesky "
-               "exactly. Without the key, or with auto, it is chosen by one_newton_step, the number of vertices, and "
-               "what is tracked.")
-          .choice<ClothSolver>({{"auto", ClothSolver::automatic},
-                                {"cholesky", ClothSolver::cholesky},
-                                {"conjugate_gradients", ClothSolver::conjugate_gradients},
-                                {"gauss_seidel", ClothSolver::gauss_seidel}}));
-  assign(cloth.linear_tolerance,
-         solver.get("tolerance", "Relative residual to which the linear equations are solved. Without the key: 0.005.")
-             .number(Range::between(0, 1)));
-  assign(cloth.one_newton_step, solver
-                                    .get("one_newton_step",
-                                         "Whether each step takes a single Newton iteration: several times as fast, "
-                                         "and less exact. Without the key: false.")
-                                    .boolean());
+  solver.get(
+      "linear", cloth.solver,
+      {{"auto", ClothSolver::automatic},
+       {"cholesky", ClothSolver::cholesky},
+       {"conjugate_gradients", ClothSolver::conjugate_gradients},
+       {"gauss_seidel", ClothSolver::gauss_seidel}},
+      "Solver of the linear equations: gauss_seidel and conjugate_gradients solve to `tolerance`, cholesky exactly. "
+      "Without the key, or with auto, it is chosen by one_newton_step, the number of vertices, and what is tracked.");
+  solver.get("tolerance", cloth.linear_tolerance, Range::between(0, 1),
+             "Relative residual to which the linear equations are solved. Without the key: 0.005.");
+  solver.get("one_newton_step", cloth.one_newton_step,
+             "Whether each step takes a single Newton iteration: several times as fast, and less exact. Without the "
+             "key: false.");
   solver.finish();
   readGrasps(map.get("grasps",
                      "Vertices that are held, each group under a name of its own. Names of grasps differ within a "
@@ -442,19 +404,12 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
 
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context)
 {
-  std::vector<ClothConfig> cloths;
-  if (!at.present())
-    return cloths;
-  std::map<std::string, std::string> names;   // to the path that used it first
-  const auto entries = at.items(1, 1000);
-  for (std::size_t k = 0; k < entries.size(); ++k)
-  {
-    cloths.push_back(readCloth(entries[k], context, entries.size() == 1 ? "cloth" : "cloth" + std::to_string(k)));
-    const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
-    if (!is_new)
-      YamlMap(entries[k]).find("name").problem("is also the name of " + other->second + "; names must differ");
-  }
-  return cloths;
+  std::map<std::string, std::string> names;
+  return readEach<ClothConfig>(at, 1, 1000, "cloth", [&](const YamlCursor& entry, const std::string& default_name) {
+    ClothConfig cloth = readCloth(entry, context, default_name);
+    takeName(names, entry, cloth.name);
+    return cloth;
+  });
 }
 
 }   // namespace slender

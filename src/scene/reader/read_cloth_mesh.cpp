@@ -17,7 +17,7 @@ constexpr int max_cells = 2000;   // per side of a grid
 /// Returns false when something was reported.
 bool readSides(const YamlCursor& at_sides, ClothGrid& grid)
 {
-  const auto sides = at_sides.present() ? at_sides.items(2, 2) : std::vector<YamlCursor>{};
+  const auto sides = at_sides.items(2, 2);
   bool good = sides.size() == 2;
   for (std::size_t k = 0; k < sides.size(); ++k)
   {
@@ -54,8 +54,8 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
   YamlMap map(at);
   const YamlCursor file =
       map.require("file", "OBJ or PLY file with a triangle mesh; relative to the folder of the scene file.");
-  assign(read.scale, map.get("scale", "Factor by which the coordinates of the file are multiplied. Without the key: 1.")
-                         .number(Range::above(0, 1e6)));
+  map.get("scale", read.scale, Range::above(0, 1e6),
+          "Factor by which the coordinates of the file are multiplied. Without the key: 1.");
   read.pose =
       readPose(map.get("pose", "Where the mesh is placed, after scaling. Without the key: at the origin, not turned."))
           .value_or(Pose{});
@@ -64,38 +64,27 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
   if (!text)
     return std::nullopt;
   read.path = *text;
-  try
-  {
+  const bool good = file.attempt([&] {
     requireRegularFile(context.resolve(read.path));
-    read.mesh = slender::readMesh(context.resolve(read.path));
-  }
-  catch (const std::exception& error)
-  {
-    file.problem(error.what());
-    return std::nullopt;
-  }
-  read.place(read.mesh.vertices);
-  if (!(read.mesh.vertices.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-  {
-    file.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m after scale and pose");
-    return std::nullopt;
-  }
-  return read;
+    read.mesh = readMesh(context.resolve(read.path));
+    read.place(read.mesh.vertices);
+    requireCoordinates(read.mesh.vertices, "", " after scale and pose");
+  });
+  return good ? std::make_optional(std::move(read)) : std::nullopt;
 }
 
 std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& context, TriangleMesh& mesh)
 {
   ClothGrid grid;
   YamlMap map(at.sharesKeysOf("cloths.N.grid"));
-  assign(grid.corner,
-         map.get("corner", "Lower left corner of the rectangle. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  const YamlCursor
-      at_sides = map.require("sides",
-                             "Vectors from the lower left corner to the lower right and to the upper left corner; they "
-                             "are at right angles."),
-      at_cells = map.require(
-          "cells", "Number of cells along both sides: [columns, rows], or columns alone, from which the rows follow."),
-      at_seed = map.get("seed", "Seed of the random positions of `pattern: irregular`. Without the key: 1.");
+  map.get("corner", grid.corner, kCoordinate, "Lower left corner of the rectangle. Without the key: [0, 0, 0].");
+  const YamlCursor at_sides = map.require(
+      "sides",
+      "Vectors from the lower left corner to the lower right and to the upper left corner; they are at right angles.");
+  const YamlCursor at_cells = map.require(
+      "cells", "Number of cells along both sides: [columns, rows], or columns alone, from which the rows follow.");
+  const YamlCursor at_seed =
+      map.get("seed", "Seed of the random positions of `pattern: irregular`. Without the key: 1.");
   bool good = readSides(at_sides, grid);
   const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
   int columns = 0, rows = 0;
@@ -122,13 +111,13 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
     good = false;
   }
   GridPattern pattern = GridPattern::equilateral;
-  assign(pattern, map.get("pattern",
-                          "How the rectangle is divided into triangles; bending depends on the pattern. Vertices are "
-                          "numbered from the corner along the first side, row after row. Without the key: equilateral.")
-                      .choice<GridPattern>({{"one_diagonal", GridPattern::one_diagonal},
-                                            {"alternating", GridPattern::alternating},
-                                            {"equilateral", GridPattern::equilateral},
-                                            {"irregular", GridPattern::irregular}}));
+  map.get("pattern", pattern,
+          {{"one_diagonal", GridPattern::one_diagonal},
+           {"alternating", GridPattern::alternating},
+           {"equilateral", GridPattern::equilateral},
+           {"irregular", GridPattern::irregular}},
+          "How the rectangle is divided into triangles; bending depends on the pattern. Vertices are numbered from the "
+          "corner along the first side, row after row. Without the key: equilateral.");
   int seed = 1;
   assign(seed, at_seed.integer(0, 2'000'000'000));
   if (at_seed.present() && pattern != GridPattern::irregular)
@@ -136,15 +125,8 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
   map.finish();
   if (!good || !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
     return std::nullopt;
-  try
-  {
-    mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed));
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at.problem(error.what());
+  if (!at.attempt([&] { mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed)); }))
     return std::nullopt;
-  }
   Eigen::Matrix<double, 3, 2> axes;
   axes << grid.sides[0] / width, grid.sides[1] / height;
   mesh.vertices = ((axes * mesh.vertices.topRows<2>()).colwise() + grid.corner).eval();
@@ -157,16 +139,7 @@ bool readClothMesh(const YamlCursor& at, const ReadContext& context, TriangleMes
   if (!read)
     return false;
   mesh = read->mesh;
-  try
-  {
-    requireSoundMesh(mesh, read->path);
-  }
-  catch (const std::exception& error)
-  {
-    YamlMap(at).find("file").problem(error.what());
-    return false;
-  }
-  return true;
+  return at.find("file").attempt([&] { requireSoundMesh(mesh, read->path); });
 }
 
 Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context, const TriangleMesh& cloth)
@@ -176,7 +149,7 @@ Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context
     return {};   // none, or reported
   const TriangleMesh& mesh = read->mesh;
   const std::string& path = read->path;
-  const YamlCursor file = YamlMap(at).find("file");
+  const YamlCursor file = at.find("file");
   const auto differs = [&](const std::string& what, Eigen::Index here, Eigen::Index there) {
     file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " +
                  std::to_string(there) + "; both must have the same triangles of the same vertices, in the same order");

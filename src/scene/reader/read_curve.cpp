@@ -10,8 +10,6 @@ namespace slender {
 
 namespace {
 
-const Range positive = Range::above(0, kMaxCoordinate, "m");
-
 std::optional<int> readEdges(YamlMap& map, const char* meaning)
 {
   return map.get("edges", meaning).integer(1, max_edges);
@@ -29,13 +27,11 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
 StraightCurve readStraight(YamlMap& map)
 {
   StraightCurve curve;
-  assign(curve.from, map.get("from", "First node. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  assign(curve.to, map.get("to", "Last node. Without the key: [1, 0, 0].").vector3(kCoordinate));
+  map.get("from", curve.from, kCoordinate, "First node. Without the key: [0, 0, 0].");
+  map.get("to", curve.to, kCoordinate, "Last node. Without the key: [1, 0, 0].");
   assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
-  assign(curve.grading,
-         map.get("grading",
-                 "Length of the last edge over that of the first. Without the key: 1, all edges are equally long.")
-             .number(Range::closed(0.01, 100)));
+  map.get("grading", curve.grading, Range::closed(0.01, 100),
+          "Length of the last edge over that of the first. Without the key: 1, all edges are equally long.");
   if (!((curve.to - curve.from).norm() > 0))
     map.at().problem("from and to are the same point; must differ");
   return curve;
@@ -53,13 +49,13 @@ PolylineCurve readPolyline(YamlMap& map)
 ArcCurve readArc(YamlMap& map)
 {
   ArcCurve curve;
-  assign(curve.center, map.get("center", "Centre of the circle. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  assign(curve.start, map.get("start", "First node. Without the key: [1, 0, 0].").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis", "Axis about which the arc turns, through `center`. Without the key: [0, 0, 1].")
-                         .vector3(kCoordinate));
+  map.get("center", curve.center, kCoordinate, "Centre of the circle. Without the key: [0, 0, 0].");
+  map.get("start", curve.start, kCoordinate, "First node. Without the key: [1, 0, 0].");
+  map.get("axis", curve.axis, kCoordinate,
+          "Axis about which the arc turns, through `center`. Without the key: [0, 0, 1].");
   const YamlCursor angle =
-      map.get("angle", "Angle of the arc, positive by the right-hand rule about `axis`. Without the key: 1 rad.");
-  assign(curve.angle, angle.number(Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad")));
+      map.get("angle", curve.angle, Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad"),
+              "Angle of the arc, positive by the right-hand rule about `axis`. Without the key: 1 rad.");
   if (curve.angle == 0)
     angle.problem("must not be zero");
   assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
@@ -76,14 +72,12 @@ ArcCurve readArc(YamlMap& map)
 HelixCurve readHelix(YamlMap& map)
 {
   HelixCurve curve;
-  assign(
-      curve.center,
-      map.get("center", "Foot of the axis, beside the first node. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis", "Direction of the axis. Without the key: [0, 0, 1].").vector3(kCoordinate));
-  assign(curve.radius, map.get("radius", "Radius of the helix. Without the key: 0.1 m.").number(positive));
-  assign(curve.pitch, map.get("pitch", "Rise along the axis per turn. Without the key: 0.05 m.").number(kCoordinate));
-  const YamlCursor turns = map.get("turns", "Number of turns; negative for a left-handed helix. Without the key: 3.");
-  assign(curve.turns, turns.number(Range::closed(-1e5, 1e5)));
+  map.get("center", curve.center, kCoordinate, "Foot of the axis, beside the first node. Without the key: [0, 0, 0].");
+  map.get("axis", curve.axis, kCoordinate, "Direction of the axis. Without the key: [0, 0, 1].");
+  map.get("radius", curve.radius, kLength, "Radius of the helix. Without the key: 0.1 m.");
+  map.get("pitch", curve.pitch, kCoordinate, "Rise along the axis per turn. Without the key: 0.05 m.");
+  const YamlCursor turns = map.get("turns", curve.turns, Range::closed(-1e5, 1e5),
+                                   "Number of turns; negative for a left-handed helix. Without the key: 3.");
   if (curve.turns == 0)
     turns.problem("must not be zero; negative turns give a left-handed helix");
   assign(curve.edges, readEdges(map, "Number of edges. Without the key: 150."));
@@ -93,12 +87,10 @@ HelixCurve readHelix(YamlMap& map)
 CatenaryCurve readCatenary(YamlMap& map)
 {
   CatenaryCurve curve;
-  assign(curve.from, map.get("from", "First node. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  assign(curve.to, map.get("to", "Last node. Without the key: [1, 0, 0].").vector3(kCoordinate));
-  assign(curve.length,
-         map.get("length",
-                 "Length of the hanging chain; not shorter than the distance of its ends. Without the key: 1.2 m.")
-             .number(positive));
+  map.get("from", curve.from, kCoordinate, "First node. Without the key: [0, 0, 0].");
+  map.get("to", curve.to, kCoordinate, "Last node. Without the key: [1, 0, 0].");
+  map.get("length", curve.length, kLength,
+          "Length of the hanging chain; not shorter than the distance of its ends. Without the key: 1.2 m.");
   assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
   return curve;
 }
@@ -106,21 +98,15 @@ CatenaryCurve readCatenary(YamlMap& map)
 TrefoilCurve readTrefoil(YamlMap& map)
 {
   TrefoilCurve curve;
-  assign(curve.center,
-         map.get("center", "Centre of the knot, on the line of its two tails. Without the key: [0, 0, 0].")
-             .vector3(kCoordinate));
-  assign(curve.axis, map.get("axis", "Direction of the two tails. Without the key: [1, 0, 0].").vector3(kCoordinate));
-  assign(curve.up,
-         map.get("up", "Direction away from which the loop lies. Without the key: [0, 0, 1].").vector3(kCoordinate));
-  assign(curve.radius, map.get("radius", "Radius of the loop. Without the key: 0.1 m.").number(positive));
-  assign(
-      curve.separation,
-      map.get("separation",
-              "Distance of the two strands where they wind about each other. Without the key: an eighth of the radius.")
-          .number(positive));
-  assign(curve.length, map.get("length", "Length of the whole curve. Without the key: 1.5 m.").number(positive));
-  assign(curve.left_handed,
-         map.get("left_handed", "Whether the knot is the mirror image. Without the key: false.").boolean());
+  map.get("center", curve.center, kCoordinate,
+          "Centre of the knot, on the line of its two tails. Without the key: [0, 0, 0].");
+  map.get("axis", curve.axis, kCoordinate, "Direction of the two tails. Without the key: [1, 0, 0].");
+  map.get("up", curve.up, kCoordinate, "Direction away from which the loop lies. Without the key: [0, 0, 1].");
+  map.get("radius", curve.radius, kLength, "Radius of the loop. Without the key: 0.1 m.");
+  map.get("separation", curve.separation, kLength,
+          "Distance of the two strands where they wind about each other. Without the key: an eighth of the radius.");
+  map.get("length", curve.length, kLength, "Length of the whole curve. Without the key: 1.5 m.");
+  map.get("left_handed", curve.left_handed, "Whether the knot is the mirror image. Without the key: false.");
   assign(curve.edges, readEdges(map, "Number of edges. Without the key: 150."));
   return curve;
 }
@@ -128,18 +114,15 @@ TrefoilCurve readTrefoil(YamlMap& map)
 TorusKnotCurve readTorusKnot(YamlMap& map)
 {
   TorusKnotCurve curve;
-  assign(curve.center, map.get("center", "Centre of the knot. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  assign(curve.axis, map.get("axis", "Axis of the torus. Without the key: [0, 0, 1].").vector3(kCoordinate));
-  assign(
-      curve.radius,
-      map.get("radius", "Radius of the circle around which the curve winds. Without the key: 0.1 m.").number(positive));
-  assign(curve.tube_radius,
-         map.get("tube_radius", "Distance of the curve from that circle. Without the key: 0.04 m.").number(positive));
-  assign(curve.around, map.get("around", "Number of turns about the axis. Without the key: 2.").integer(1, 1000));
-  assign(curve.through,
-         map.get("through",
-                 "Number of turns about the circle. Without the key: 3, which with `around` 2 is the closed trefoil.")
-             .integer(1, 1000));
+  map.get("center", curve.center, kCoordinate, "Centre of the knot. Without the key: [0, 0, 0].");
+  map.get("axis", curve.axis, kCoordinate, "Axis of the torus. Without the key: [0, 0, 1].");
+  map.get("radius", curve.radius, kLength,
+          "Radius of the circle around which the curve winds. Without the key: 0.1 m.");
+  map.get("tube_radius", curve.tube_radius, kLength,
+          "Distance of the curve from that circle. Without the key: 0.04 m.");
+  map.get("around", curve.around, Range::closed(1, 1000), "Number of turns about the axis. Without the key: 2.");
+  map.get("through", curve.through, Range::closed(1, 1000),
+          "Number of turns about the circle. Without the key: 3, which with `around` 2 is the closed trefoil.");
   assign(curve.edges, readEdges(map, "Number of edges. Without the key: 120."));
   return curve;
 }
@@ -147,14 +130,11 @@ TorusKnotCurve readTorusKnot(YamlMap& map)
 VeeCurve readVee(YamlMap& map)
 {
   VeeCurve curve;
-  assign(curve.tip, map.get("tip", "Point where the two arms meet. Without the key: [0, 0, 0].").vector3(kCoordinate));
-  assign(curve.direction,
-         map.get("direction", "Direction between the arms. Without the key: [1, 0, 0].").vector3(kCoordinate));
-  assign(curve.normal,
-         map.get("normal", "Normal of the plane of the arms. Without the key: [0, 0, 1].").vector3(kCoordinate));
-  assign(curve.arm, map.get("arm", "Length of each arm. Without the key: 0.5 m.").number(positive));
-  assign(curve.angle,
-         map.get("angle", "Angle between the arms. Without the key: pi/2.").number(Range::between(0, M_PI, "rad")));
+  map.get("tip", curve.tip, kCoordinate, "Point where the two arms meet. Without the key: [0, 0, 0].");
+  map.get("direction", curve.direction, kCoordinate, "Direction between the arms. Without the key: [1, 0, 0].");
+  map.get("normal", curve.normal, kCoordinate, "Normal of the plane of the arms. Without the key: [0, 0, 1].");
+  map.get("arm", curve.arm, kLength, "Length of each arm. Without the key: 0.5 m.");
+  map.get("angle", curve.angle, Range::between(0, M_PI, "rad"), "Angle between the arms. Without the key: pi/2.");
   assign(curve.edges, readEdges(map, "Number of edges, an even one. Without the key: 50."));
   return curve;
 }
@@ -168,19 +148,14 @@ FileCurve readFile(YamlMap& map, const ReadContext& context)
   if (const auto text = path.text())
   {
     curve.path = context.resolve(*text);
-    try
-    {
+    path.attempt([&] {
       curve.points = readPointFile(curve.path);
       if (curve.points.size() < 2 || curve.points.size() > max_edges + 1u)
       {
-        path.problem("holds " + std::to_string(curve.points.size()) + " points; must hold 2 to " +
-                     std::to_string(max_edges + 1));
+        throw std::runtime_error("holds " + std::to_string(curve.points.size()) + " points; must hold 2 to " +
+                                 std::to_string(max_edges + 1));
       }
-    }
-    catch (const SceneError& error)
-    {
-      path.problem(error.what());
-    }
+    });
   }
   return curve;
 }

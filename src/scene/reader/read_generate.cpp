@@ -22,9 +22,9 @@ Generated readGenerators(const YamlCursor& at, const ReadContext& context, int f
   {
     const std::size_t before = item.problems().size();
     YamlMap map(item);
-    const YamlCursor chain = map.get("chain", "A chain of round links, each of which is a rod."),
-                     tree = map.get("tree", "A tree: each branch is a tapered rod, and small balls join the branches."),
-                     hair = map.get("hair", "Strands of hair on a ball, which is an obstacle; each strand is a rod.");
+    const YamlCursor chain = map.get("chain", "A chain of round links, each of which is a rod.");
+    const YamlCursor tree = map.get("tree", "A tree: each branch is a tapered rod, and small balls join the branches.");
+    const YamlCursor hair = map.get("hair", "Strands of hair on a ball, which is an obstacle; each strand is a rod.");
     map.finish();
     if (item.problems().size() != before)
       continue;

@@ -2,7 +2,6 @@
 #include <tuple>
 
 #include "read_parts.h"
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -15,28 +14,22 @@ std::optional<std::pair<int, int>> readIndices(const YamlCursor& at, int count)
   if (indices.empty())
     return std::nullopt;
   for (std::size_t k = 1; k < indices.size(); ++k)
-  {
     if (indices[k] != indices[k - 1] + 1)
-    {
-      at.problem("must be consecutive and each given once; make one grasp for each group");
-      return std::nullopt;
-    }
-  }
+      return at.problem("must be consecutive and each given once; make one grasp for each group");
   return std::make_pair(indices.front(), indices.back());
 }
 
 void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
 {
-  const YamlCursor
-      edge_list =
-          map.get("edges",
-                  "Edges that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is "
-                  "a range. A single end edge of an open rod, [0] or [-1], means the section at the end node, so that "
-                  "the whole length is free. All nodes of other edges are held. Give either `edges` or `nodes`."),
-      node_list =
-          map.get("nodes",
-                  "Nodes that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is "
-                  "a range. One index holds the section at that node. Give either `edges` or `nodes`.");
+  const YamlCursor edge_list =
+      map.get("edges",
+              "Edges that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is a "
+              "range. A single end edge of an open rod, [0] or [-1], means the section at the end node, so that the "
+              "whole length is free. All nodes of other edges are held. Give either `edges` or `nodes`.");
+  const YamlCursor node_list =
+      map.get("nodes",
+              "Nodes that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is a "
+              "range. One index holds the section at that node. Give either `edges` or `nodes`.");
   if (edge_list.present() == node_list.present())
   {
     if (map.at().isMap())
@@ -68,14 +61,13 @@ void readFrame(YamlMap& map, GraspConfig& grasp)
 {
   const Range any = Range::closed(-1e6, 1e6);
   const YamlCursor direction =
-                       map.get("direction",
-                               "Tangent of the held section in world axes, from the first node to the last, for "
-                               "poses without an orientation. Without the key the tangent at the start is kept."),
-                   director =
-                       map.get("director",
-                               "First material axis d1 of the held section in world axes, for poses without an "
-                               "orientation; the part along the tangent does not count. Without the key d1 at the "
-                               "start is carried to the new tangent by the smallest rotation.");
+      map.get("direction",
+              "Tangent of the held section in world axes, from the first node to the last, for poses without an "
+              "orientation. Without the key the tangent at the start is kept.");
+  const YamlCursor director = map.get("director",
+                                      "First material axis d1 of the held section in world axes, for poses without an "
+                                      "orientation; the part along the tangent does not count. Without the key d1 at "
+                                      "the start is carried to the new tangent by the smallest rotation.");
   for (const auto& [at, vector] :
        {std::make_pair(direction, &grasp.direction), std::make_pair(director, &grasp.director)})
   {
@@ -101,7 +93,7 @@ void checkFrame(YamlMap& map, const GraspConfig& grasp)
   if (grasp.direction.isZero(0) && grasp.director.isZero(0))
     return;
   const YamlCursor at = map.find(grasp.direction.isZero(0) ? "director" : "direction"), motion = map.find("motion");
-  const YamlCursor table = motion.isMap() ? YamlMap(motion).find("table") : motion;
+  const YamlCursor table = motion.isMap() ? motion.find("table") : motion;
   if (!std::holds_alternative<FixedMotion>(grasp.motion) && !(motion.isMap() && table.present()))
   {
     at.problem(
@@ -127,7 +119,7 @@ void checkFrame(YamlMap& map, const GraspConfig& grasp)
 bool givesOffset(const YamlMap& grasp)
 {
   const YamlCursor motion = grasp.find("motion");
-  return grasp.has("offset") || (motion.isMap() && YamlMap(motion).has("offset"));
+  return grasp.has("offset") || (motion.isMap() && motion.find("offset").present());
 }
 
 void readOffset(YamlMap& map, GraspConfig& grasp)
@@ -135,9 +127,9 @@ void readOffset(YamlMap& map, GraspConfig& grasp)
   const YamlCursor own = map.get("offset",
                                  "Where the held part is in the frame that `motion` gives, for example in that of a "
                                  "gripper. It stays the same for ever; the grasp goes there, and after a reset again. "
-                                 "Not with attach: initial. Without the key: as `attach` says."),
-                   motion = map.find("motion");
-  const YamlCursor of_tf = motion.isMap() ? YamlMap(motion).find("offset") : map.find("offset");
+                                 "Not with attach: initial. Without the key: as `attach` says.");
+  const YamlCursor motion = map.find("motion");
+  const YamlCursor of_tf = motion.isMap() ? motion.find("offset") : map.find("offset");
   const bool twice = motion.isMap() && own.present() && of_tf.present();
   const YamlCursor& given = own.present() ? own : of_tf;
   if (own.present())
@@ -218,11 +210,11 @@ void readGraspContact(YamlMap& map, GraspConfig& grasp)
   if (!at.present())
     return;
   YamlMap contact(at);
-  const YamlCursor ignore = contact.get("ignore",
-                                        "Names of obstacles, or frames of links of a robot, that the whole object "
-                                        "passes through. Without the key the part near the grasp passes through the "
-                                        "links of robots that the held part touches at the start; with [] through "
-                                        "none.");
+  const YamlCursor ignore =
+      contact.get("ignore",
+                  "Names of obstacles, or frames of links of a robot, that the whole object passes through. Without "
+                  "the key the part near the grasp passes through the links of robots that the held part touches at "
+                  "the start; with [] through none.");
   ignore.takes("a list of names");
   contact.finish();
   if (!ignore.present())
@@ -233,8 +225,7 @@ void readGraspContact(YamlMap& map, GraspConfig& grasp)
       grasp.ignored_contacts->push_back(*name);
 }
 
-void checkIgnoredContacts(const SceneConfig& scene, const std::vector<YamlCursor>& rods,
-                          const std::vector<YamlCursor>& cloths)
+void checkIgnoredContacts(const SceneConfig& scene, const std::vector<ListedGrasp>& grasps)
 {
   std::vector<std::string> names;
   for (const ObstacleConfig& obstacle : scene.obstacles)
@@ -243,23 +234,13 @@ void checkIgnoredContacts(const SceneConfig& scene, const std::vector<YamlCursor
     if (!obstacle.link.empty() && obstacle.link != obstacle.name)
       names.push_back(obstacle.link);
   }
-  const auto check = [&](const std::vector<GraspConfig>& grasps, const YamlCursor& entry) {
-    for (const GraspConfig& grasp : grasps)
-      for (const std::string& name : grasp.ignored_contacts.value_or(std::vector<std::string>{}))
+  for (const ListedGrasp& grasp : grasps)
+    for (const std::string& name : grasp.config.ignored_contacts.value_or(std::vector<std::string>{}))
+      if (std::find(names.begin(), names.end(), name) == names.end())
       {
-        if (std::find(names.begin(), names.end(), name) != names.end())
-          continue;
-        const std::string nearest = nearestWord(name, names);
-        YamlMap(YamlMap(YamlMap(YamlMap(entry).find("grasps")).find(grasp.name)).find("contact"))
-            .find("ignore")
-            .problem("the scene has no obstacle and no link " + name +
-                     (nearest.empty() ? std::string() : " (did you mean " + nearest + "?)"));
+        grasp.at.find("contact").find("ignore").problem("the scene has no obstacle and no link " + name +
+                                                        didYouMean(name, names));
       }
-  };
-  for (std::size_t r = 0; r < rods.size(); ++r)
-    check(scene.rods[r].grasps, rods[r]);
-  for (std::size_t k = 0; k < cloths.size(); ++k)
-    check(scene.cloths[k].grasps, cloths[k]);
 }
 
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges)
@@ -268,16 +249,13 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
   grasp.name = name;
   YamlMap map(at);
   readHeldNodes(map, grasp, closed, edges);
-  const YamlCursor hold = map.get("hold",
+  const YamlCursor hold = map.get("hold", grasp.hold, {{"frame", Hold::frame}, {"position", Hold::position}},
                                   "`frame` clamps position and material frame. `position` pins the position of one "
                                   "node, which can turn freely. Without the key: frame.");
-  assign(grasp.hold, hold.choice<Hold>({{"frame", Hold::frame}, {"position", Hold::position}}));
-  assign(grasp.attach, map.get("attach",
-                               "Which point the poses of `motion` describe. `section`: the held section itself, with "
-                               "the origin half way along the held part, x along the tangent and y along d1; the "
-                               "section moves to the first pose. `initial`: a gripper, which keeps the offset to the "
-                               "section that it has at its first pose. Without the key: section.")
-                           .choice<Attach>({{"section", Attach::section}, {"initial", Attach::initial}}));
+  map.get("attach", grasp.attach, {{"section", Attach::section}, {"initial", Attach::initial}},
+          "Which point the poses of `motion` describe. `section`: the held section itself, with the origin half way "
+          "along the held part, x along the tangent and y along d1; the section moves to the first pose. `initial`: a "
+          "gripper, which keeps the offset to the section that it has at its first pose. Without the key: section.");
   grasp.limits = readGraspLimits(map.get("limits", "Limits of this grasp. Without the key: those of the scene."));
   readFrame(map, grasp);
   const bool oriented = grasp.direction.norm() + grasp.director.norm() > 0;

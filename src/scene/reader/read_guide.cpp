@@ -10,7 +10,6 @@
 #include "slender_sim/scene/pose_file.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorded_guide.h"
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -72,62 +71,40 @@ std::optional<GuideMotion> readFrames(const YamlCursor& at, double rate, double 
   const auto star = pattern->find('*');
   if (star == std::string::npos || pattern->find('*', star + 1) != std::string::npos ||
       pattern->find('/', star) != std::string::npos)
-  {
-    at.problem("must have one * in the name of the file, for example guide/frame_*.obj");
-    return std::nullopt;
-  }
+    return at.problem("must have one * in the name of the file, for example guide/frame_*.obj");
   std::vector<std::string> files;
-  try
-  {
-    files = matchingFiles(context.resolve(*pattern));
-  }
-  catch (const std::runtime_error& error)
-  {
-    at.problem(error.what());
+  if (!at.attempt([&] { files = matchingFiles(context.resolve(*pattern)); }))
     return std::nullopt;
-  }
   if (files.empty())
-  {
-    at.problem("no such file; there must be at least one");
-    return std::nullopt;
-  }
+    return at.problem("no such file; there must be at least one");
   const TriangleMesh& mesh = source.config.mesh;
   if (3 * static_cast<std::size_t>(mesh.vertices.cols()) * files.size() > kMaxGuideNumbers)
   {
-    at.problem("has " + std::to_string(files.size()) +
-               " frames, too many for memory; leave out some and lower the rate");
-    return std::nullopt;
+    return at.problem("has " + std::to_string(files.size()) +
+                      " frames, too many for memory; leave out some and lower the rate");
   }
   FrameGuide guide;
-  for (std::size_t k = 0; k < files.size(); ++k)
-  {
-    try
+  const bool good = at.attempt([&] {
+    for (std::size_t k = 0; k < files.size(); ++k)
     {
       requireRegularFile(files[k]);
       TriangleMesh frame = readMesh(files[k]);
       if (frame.vertices.cols() != mesh.vertices.cols() || frame.triangles != mesh.triangles)
       {
-        at.problem(files[k] + " has " + std::to_string(frame.vertices.cols()) + " vertices and " +
-                   std::to_string(frame.triangles.cols()) + " triangles, the guide's mesh has " +
-                   std::to_string(mesh.vertices.cols()) + " and " + std::to_string(mesh.triangles.cols()) +
-                   "; all frames must have the mesh's triangles, in its order");
-        return std::nullopt;
+        throw std::runtime_error(files[k] + " has " + std::to_string(frame.vertices.cols()) + " vertices and " +
+                                 std::to_string(frame.triangles.cols()) + " triangles, the guide's mesh has " +
+                                 std::to_string(mesh.vertices.cols()) + " and " +
+                                 std::to_string(mesh.triangles.cols()) +
+                                 "; all frames must have the mesh's triangles, in its order");
       }
       if (source.file)
         source.file->place(frame.vertices);
-      if (!(frame.vertices.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-      {
-        at.problem(files[k] + " has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
-        return std::nullopt;
-      }
+      requireCoordinates(frame.vertices, files[k] + " ");
       guide.points.append(begin + static_cast<double>(k) / rate, frame.vertices);
     }
-    catch (const std::exception& error)
-    {
-      at.problem(error.what());
-      return std::nullopt;
-    }
-  }
+  });
+  if (!good)
+    return std::nullopt;
   if (begin <= 0)   // else the guide stands still until then
     guide.points.startInMotion();
   return GuideMotion(std::move(guide));
@@ -152,16 +129,10 @@ std::optional<CarriedGuide> readGroups(const YamlCursor& at, const ReadContext& 
       add(name, readIndexList(list, vertices));
   if (vertices == 0 || guide.bodies.empty())
     return std::nullopt;
-  try
-  {
+  const bool good = at.attempt([&] {
     guide.binding = GuideBinding(source.config.mesh.vertices, std::vector<Pose>(guide.bodies.size()), shares);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at.problem(error.what());
-    return std::nullopt;
-  }
-  return guide;
+  });
+  return good ? std::make_optional(std::move(guide)) : std::nullopt;
 }
 
 /// Takes the poses of those bodies that carry vertices.
@@ -179,21 +150,6 @@ void takeBodyPoses(const YamlCursor& at, const std::vector<BodyTrajectory>& reco
       return;
     }
     guide.poses.push_back(recorded[found - names.begin()].poses);
-  }
-}
-
-void readBodyPoses(const YamlCursor& at, const ReadContext& context, CarriedGuide& guide)
-{
-  const auto file = at.text();
-  if (!file)
-    return;
-  try
-  {
-    takeBodyPoses(at, readPoseFile(context.resolve(*file)), guide);
-  }
-  catch (const SceneError& error)
-  {
-    at.problem(error.what());
   }
 }
 
@@ -296,9 +252,9 @@ void readCarriedMotion(const YamlCursor& at, const MotionKeys& keys, const ReadC
       return;
     takeBodyPoses(keys.bag, recorded->bodies, *carried);
   }
-  else
+  else if (const auto file = keys.bodies.text())
   {
-    readBodyPoses(keys.bodies, context, *carried);
+    keys.bodies.attempt([&] { takeBodyPoses(keys.bodies, readPoseFile(context.resolve(*file)), *carried); });
   }
   if (keys.topic.present() || carried->poses.size() == carried->bodies.size())   // else reported
     source.config.motion = std::move(*carried);
@@ -323,8 +279,7 @@ void readGuideMotion(const YamlCursor& at, const ReadContext& context, const std
   {
     if (!keys->rate.present())
       YamlMap(at).missing("rate");
-    const auto hertz = keys->rate.number(Range::above(0, 1e6, "Hz"));
-    if (hertz)
+    if (const auto hertz = keys->rate.number(Range::above(0, 1e6, "Hz")))
       assign(motion, readFrames(keys->frames, *hertz, first, context, source));
   }
   else if (keys->tf.present())
@@ -381,9 +336,9 @@ std::optional<double> readLate(const YamlCursor& at)
   if (!at.isMap())
     return at.choice<double>({{"hold", 0.0}, {"extrapolate", 0.2}});
   YamlMap map(at);
-  const auto coast =
-      map.require("extrapolate", "Time within which the last speed dies out. The word extrapolate alone means 0.2 s.")
-          .number(Range::above(0, 60, "s"));
+  std::optional<double> coast;
+  map.require("extrapolate", coast, Range::above(0, 60, "s"),
+              "Time within which the last speed dies out. The word extrapolate alone means 0.2 s.");
   map.finish();
   return coast;
 }
@@ -391,25 +346,20 @@ std::optional<double> readLate(const YamlCursor& at)
 std::vector<VertexGroup> readGroupsOf(const YamlCursor& at, const ReadContext& context,
                                       const std::optional<MeshFile>& file)
 {
+  std::vector<VertexGroup> groups;
   if (!at.choice<bool>({{"obj", true}}))
-    return {};
-  if (!file)
-  {
-    at.problem("needs a mesh from an OBJ file, whose groups (g NAME) it takes; give {NAME: [vertices]} instead");
-    return {};
-  }
-  try
-  {
-    std::vector<VertexGroup> groups = readObjGroups(context.resolve(file->path));
-    if (groups.empty())
-      at.problem(file->path + " has no groups (g NAME); give {NAME: [vertices]} instead");
     return groups;
-  }
-  catch (const std::exception& error)
-  {
-    at.problem(error.what());
-    return {};
-  }
+  at.attempt([&] {
+    if (!file)
+    {
+      throw std::runtime_error(
+          "needs a mesh from an OBJ file, whose groups (g NAME) it takes; give {NAME: [vertices]} instead");
+    }
+    groups = readObjGroups(context.resolve(file->path));
+    if (groups.empty())
+      throw std::runtime_error(file->path + " has no groups (g NAME); give {NAME: [vertices]} instead");
+  });
+  return groups;
 }
 
 void readFramedMotion(const YamlCursor& tf, const YamlCursor& offset, const YamlCursor& attach, GuideConfig& config)
@@ -437,11 +387,11 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
 {
   GuideSource source;
   YamlMap map(at);
-  const YamlCursor mesh = map.get("mesh", "Undeformed shape of the guide from a file; it may touch itself."),
-                   grid = map.get("grid", "Undeformed shape of the guide as a rectangle."),
-                   motion = map.get("motion", "How the guide moves. Without the key: fixed."),
-                   cloth =
-                       map.get("cloth", "Name of a cloth of the scene that is the guide, with its mesh and motion.");
+  const YamlCursor mesh = map.get("mesh", "Undeformed shape of the guide from a file; it may touch itself.");
+  const YamlCursor grid = map.get("grid", "Undeformed shape of the guide as a rectangle.");
+  const YamlCursor motion = map.get("motion", "How the guide moves. Without the key: fixed.");
+  const YamlCursor cloth =
+      map.get("cloth", "Name of a cloth of the scene that is the guide, with its mesh and motion.");
   if (cloth.present())
   {
     for (const YamlCursor& other : {mesh, grid, motion})
@@ -469,7 +419,7 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
     const std::vector<MeshDefect> defects = topologyDefects(source.config.mesh);   // it may meet itself
     if (!defects.empty())
     {
-      YamlMap(mesh).find("file").problem(source.file->path + ": " + defects.front().message);
+      mesh.find("file").problem(source.file->path + ": " + defects.front().message);
       source.config.mesh = TriangleMesh{};
     }
   }

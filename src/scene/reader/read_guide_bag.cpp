@@ -2,7 +2,6 @@
 #include <stdexcept>
 
 #include "read_tracking.h"
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -28,11 +27,10 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
   if (at.isMap())
   {
     YamlMap map(at);
-    assign(source.file, map.require("file", "Path of the bag.").text());
-    assign(source.topic, map.get("topic", "Topic of the messages, if the bag holds several.").text());
-    assign(
-        source.object,
-        map.get("cloth", "Name of the cloth in the messages. Without the key: the name of the tracked cloth.").text());
+    map.require("file", source.file, "Path of the bag.");
+    map.get("topic", source.topic, "Topic of the messages, if the bag holds several.");
+    map.get("cloth", source.object,
+            "Name of the cloth in the messages. Without the key: the name of the tracked cloth.");
     map.finish();
   }
   else
@@ -43,23 +41,14 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
     return std::nullopt;
   source.file = context.resolve(source.file);
   if (!guideBagReader())
-  {
-    at.problem("needs a program that reads bags: simulate or tracking_node, built with ROS (WITH_ROS)");
+    return at.problem("needs a program that reads bags: simulate or tracking_node, built with ROS (WITH_ROS)");
+  std::optional<RecordedGuide> recorded;
+  if (!at.attempt([&] { recorded = guideBagReader()(source); }))
     return std::nullopt;
-  }
-  try
-  {
-    RecordedGuide recorded = guideBagReader()(source);
-    context.guide_bags.push_back(source.file);
-    if (!recorded.gaps.empty())
-      at.warning(recorded.gaps);
-    return recorded;
-  }
-  catch (const std::runtime_error& error)
-  {
-    at.problem(error.what());
-    return std::nullopt;
-  }
+  context.guide_bags.push_back(source.file);
+  if (!recorded->gaps.empty())
+    at.warning(recorded->gaps);
+  return recorded;
 }
 
 void readBagPoints(const YamlCursor& at, const ReadContext& context, double begin, const std::string& object,
@@ -76,14 +65,12 @@ void readBagPoints(const YamlCursor& at, const ReadContext& context, double begi
                " vertices");
     return;
   }
-  for (const Eigen::Matrix3Xd& frame : recorded->points.frames())
-  {
-    if (!(frame.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-    {
-      at.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
-      return;
-    }
-  }
+  const bool good = at.attempt([&] {
+    for (const Eigen::Matrix3Xd& frame : recorded->points.frames())
+      requireCoordinates(frame);
+  });
+  if (!good)
+    return;
   if (begin <= 0)   // else the guide stands still until then
     recorded->points.startInMotion();
   source.config.motion = FrameGuide{std::move(recorded->points)};

@@ -31,15 +31,8 @@ std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientatio
     std::vector<double> numbers = *row;
     if (numbers.size() == 4)
       numbers.insert(numbers.end(), {0, 0, 0, 1});
-    try
-    {
-      appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1));
-    }
-    catch (const std::invalid_argument& error)
-    {
-      item.problem(error.what());
-      good = false;
-    }
+    const auto append = [&] { appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1)); };
+    good = item.attempt(append) && good;
   }
   return good && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion)) : std::nullopt;
 }
@@ -49,45 +42,36 @@ std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCurs
 {
   const auto file = path.text();
   const auto name = body.text();
-  if (!file || (body.present() && !name))
+  std::vector<BodyTrajectory> bodies;
+  if (!file || (body.present() && !name) || !path.attempt([&] { bodies = readPoseFile(context.resolve(*file)); }))
     return std::nullopt;
-  try
+  std::vector<std::string> names;
+  for (BodyTrajectory& entry : bodies)
   {
-    auto bodies = readPoseFile(context.resolve(*file));
-    std::vector<std::string> names;
-    for (BodyTrajectory& entry : bodies)
-    {
-      if (name ? entry.body == *name : bodies.size() == 1)
-        return TableMotion{std::move(entry.poses)};
-      names.push_back(entry.body);
-    }
-    body.problem(name ? "is not in " + *file + "; it has: " + joinWords(names)
-                      : "is missing; " + *file + " holds several bodies, of which it names one: " + joinWords(names));
+    if (name ? entry.body == *name : bodies.size() == 1)
+      return TableMotion{std::move(entry.poses)};
+    names.push_back(entry.body);
   }
-  catch (const SceneError& error)
-  {
-    path.problem(error.what());
-  }
-  return std::nullopt;
-}
-
-void checkTopic(const YamlCursor& topic)
-{
-  const auto on = topic.boolean();
-  if (on && !*on)
-    topic.problem("must be true; without a topic it is written motion: fixed");
+  return body.problem(name ? "is not in " + *file + "; it has: " + joinWords(names)
+                           : "is missing; " + *file +
+                                 " holds several bodies, of which it names one: " + joinWords(names));
 }
 
 constexpr const char* kTfMeaning =
     "Name of a frame of tf that is followed, for example tool0; a node looks it up, and without a node nothing moves.";
 constexpr const char* kTfOffsetMeaning =
     "With `tf`: pose in the frame of what is moved. Without the key: the frame's own pose.";
+constexpr const char* kFileMeaning =
+    "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, give `body` as well.";
 
-void refuseOffset(const YamlCursor& offset, const YamlCursor& tf)
+/// The keys that say how something moves.
+struct PoseKeys
 {
-  if (offset.present() && !tf.present())
-    offset.problem("is for motion: {tf: FRAME}");
-}
+  YamlCursor topic, tf, offset, body, table, file;
+
+  /// Number of ways in which they say it.
+  int given() const { return topic.present() + tf.present() + table.present() + (body.present() || file.present()); }
+};
 
 /// Returns nothing if a problem was reported.
 std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
@@ -102,6 +86,27 @@ std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
   return motion;
 }
 
+/// Reads the motion that the keys give in one way: by messages, with a frame of tf, or by timed poses. It is fixed if a
+/// problem was reported.
+template <class SomeMotion>
+SomeMotion readKeys(const PoseKeys& keys, const ReadContext& context, bool needs_orientation)
+{
+  SomeMotion motion = FixedMotion{};
+  if (keys.topic.present())
+  {
+    if (!keys.topic.boolean().value_or(true))
+      keys.topic.problem("must be true; without a topic it is written motion: fixed");
+    motion = TopicMotion{};
+  }
+  else if (keys.tf.present())
+    assign(motion, readTf(keys.tf, keys.offset));
+  else if (keys.table.present())
+    assign(motion, readTable(keys.table, needs_orientation));
+  else
+    assign(motion, readFileMotion(keys.file, keys.body, context));
+  return motion;
+}
+
 }   // namespace
 
 std::optional<std::string> readFrameName(const YamlCursor& at)
@@ -111,10 +116,7 @@ std::optional<std::string> readFrameName(const YamlCursor& at)
     return std::nullopt;
   const std::string frame = name->empty() || name->front() != '/' ? *name : name->substr(1);
   if (frame.empty() || frame.front() == '/' || frame.find_first_of(" \t\n") != std::string::npos)
-  {
-    at.problem("is no name of a frame of tf; must be one word, for example tool0");
-    return std::nullopt;
-  }
+    return at.problem("is no name of a frame of tf; must be one word, for example tool0");
   return frame;
 }
 
@@ -131,49 +133,29 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor topic = map.get("topic", "Must be true: the motion comes by messages. Same as the word topic."),
-                   body = map.get("body",
+  const YamlCursor topic = map.get("topic", "Must be true: the motion comes by messages. Same as the word topic.");
+  const YamlCursor body = map.get("body",
                                   "Name of the body to follow: a driven body or an obstacle of the scene, or one that "
-                                  "only messages tell of. With `file`: name of the body in the file."),
-                   tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning),
-                   table = map.get("table",
+                                  "only messages tell of. With `file`: name of the body in the file.");
+  const YamlCursor tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning);
+  const YamlCursor table = map.get("table",
                                    "Timed poses: rows [t, x, y, z, qx, qy, qz, qw], with t in s, lengths in m and a "
-                                   "unit quaternion. Poses between rows are interpolated smoothly."),
-                   file = map.get("file",
-                                  "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, "
-                                  "give `body` as well.");
+                                   "unit quaternion. Poses between rows are interpolated smoothly.");
+  const PoseKeys keys{topic, tf, offset, body, table, map.get("file", kFileMeaning)};
   map.finish();
-  refuseOffset(offset, tf);
-  const int given = topic.present() + tf.present() + table.present() + (body.present() || file.present());
-  if (given != 1)
+  if (offset.present() && !tf.present())
+    offset.problem("is for motion: {tf: FRAME}");
+  if (keys.given() != 1 && at.problems().size() == before)
   {
-    if (at.problems().size() == before)
-    {
-      at.problem(
-          "must be fixed or one of {topic: true}, {tf: FRAME}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
-    }
+    at.problem(
+        "must be fixed or one of {topic: true}, {tf: FRAME}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
   }
-  else if (topic.present())
-  {
-    checkTopic(topic);
-    motion = TopicMotion{};
-  }
-  else if (tf.present())
-  {
-    assign(motion, readTf(tf, offset));
-  }
-  else if (table.present())
-  {
-    assign(motion, readTable(table, needs_orientation));
-  }
-  else if (file.present())
-  {
-    assign(motion, readFileMotion(file, body, context));
-  }
-  else if (const auto name = body.text())
-  {
+  if (keys.given() != 1)
+    return motion;
+  if (!body.present() || keys.file.present())
+    return readKeys<Motion>(keys, context, needs_orientation);
+  if (const auto name = body.text())
     motion = BodyMotion{*name};
-  }
   return motion;
 }
 
@@ -195,42 +177,24 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
   YamlMap map(at);
   const YamlCursor topic = map.get("topic",
                                    "Must be true: the motion comes by messages on the topic `bodies`, or `nozzle/pose` "
-                                   "for a nozzle. Same as the word topic."),
-                   tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning),
-                   body = map.get("body", "Name of the body in `file`."),
-                   table = map.get("table",
+                                   "for a nozzle. Same as the word topic.");
+  const YamlCursor tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning),
+                   body = map.get("body", "Name of the body in `file`.");
+  const YamlCursor table = map.get("table",
                                    "Timed poses: rows [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z], with t in s, "
-                                   "lengths in m and a unit quaternion. Poses between rows are interpolated smoothly."),
-                   file = map.get("file",
-                                  "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, "
-                                  "give `body` as well.");
+                                   "lengths in m and a unit quaternion. Poses between rows are interpolated smoothly.");
+  const PoseKeys keys{topic, tf, offset, body, table, map.get("file", kFileMeaning)};
   map.finish();
-  refuseOffset(offset, tf);
-  std::optional<TableMotion> poses;
-  const int given = topic.present() + tf.present() + table.present() + (body.present() || file.present());
-  if (given != 1 || (body.present() && !file.present()))
+  if (offset.present() && !tf.present())
+    offset.problem("is for motion: {tf: FRAME}");
+  if (keys.given() == 1 && (keys.file.present() || !body.present()))
+    return readKeys<GivenMotion>(keys, context, false);
+  if (at.problems().size() == before)
   {
-    if (at.problems().size() == before)
-    {
-      at.problem(std::string("must be ") + (may_be_free ? "free, " : "") +
-                 "fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}");
-    }
+    at.problem(std::string("must be ") + (may_be_free ? "free, " : "") +
+               "fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}");
   }
-  else if (tf.present())
-  {
-    const auto motion = readTf(tf, offset);
-    return motion ? GivenMotion{*motion} : fixed;
-  }
-  else if (topic.present())
-  {
-    checkTopic(topic);
-    return GivenMotion{TopicMotion{}};
-  }
-  else
-  {
-    poses = table.present() ? readTable(table, false) : readFileMotion(file, body, context);
-  }
-  return poses ? GivenMotion{std::move(*poses)} : fixed;
+  return fixed;
 }
 
 }   // namespace slender

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,7 @@ constexpr double kMaxSceneNodes = 1e7;
 #endif
 
 inline const Range kCoordinate = Range::closed(-kMaxCoordinate, kMaxCoordinate, "m");
+inline const Range kLength = Range::above(0, kMaxCoordinate, "m");
 
 /// What the parts need to know of the scene around them.
 struct ReadContext
@@ -38,6 +40,22 @@ inline std::vector<YamlCursor> entriesOf(const YamlCursor& list)
 {
   return list.isList() ? list.items() : std::vector<YamlCursor>{};
 }
+/// Reads the entries of a list by read(entry, default name). The default name is `word`, with a number if there are
+/// several entries. Reports a list of fewer or more entries; none if there is no list.
+template <class Object, class Read>
+std::vector<Object> readEach(const YamlCursor& list, std::size_t fewest, std::size_t most, const std::string& word,
+                             const Read& read)
+{
+  std::vector<Object> objects;
+  const std::vector<YamlCursor> entries = list.items(fewest, most);
+  for (const YamlCursor& entry : entries)
+    objects.push_back(read(entry, entries.size() == 1 ? word : word + std::to_string(objects.size())));
+  return objects;
+}
+/// Reports a name that another object has. `names` says what has each of them.
+void takeName(std::map<std::string, std::string>& names, const YamlCursor& entry, const std::string& name);
+/// Throws std::runtime_error "`what` has coordinates beyond ... m `where`" if points are farther away than any may be.
+void requireCoordinates(const Eigen::Matrix3Xd& points, const std::string& what = "", const std::string& where = "");
 /// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end.
 /// `count` 0: not known, not checked. Empty when reported.
 std::vector<int> readIndexList(const YamlCursor& at, int count);
@@ -85,12 +103,19 @@ struct Generated
 /// The list `generate`; `first_rod`: number of rods before them.
 Generated readGenerators(const YamlCursor& at, const ReadContext& context, int first_rod);
 
+/// A grasp of a rod or cloth that a list of the scene has, and its place there.
+struct ListedGrasp
+{
+  const GraspConfig& config;
+  YamlCursor at;
+  bool of_cloth;
+};
+
 /// Reads `contact` of a grasp.
 void readGraspContact(YamlMap& map, GraspConfig& grasp);
 /// Reports names in `contact.ignore` of grasps that belong to no obstacle and no link. Call it after all objects were
 /// read.
-void checkIgnoredContacts(const SceneConfig& scene, const std::vector<YamlCursor>& rods,
-                          const std::vector<YamlCursor>& cloths);
+void checkIgnoredContacts(const SceneConfig& scene, const std::vector<ListedGrasp>& grasps);
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation);
 /// Nothing: free, which is also the default where it may be.
 std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free);

@@ -11,10 +11,9 @@ RecordConfig readRecord(const YamlCursor& at)
 {
   RecordConfig record;
   YamlMap map(at);
-  assign(record.every, map.get("every",
-                               "`simulate` records every n-th step, in tables, bags and OBJ files alike; nodes take "
-                               "their parameter `~state_every` instead. Without the key: 1, every step.")
-                           .integer(1, 1'000'000'000, "steps"));
+  map.get("every", record.every, Range::closed(1, 1'000'000'000, "steps"),
+          "`simulate` records every n-th step, in tables, bags and OBJ files alike; nodes take their parameter "
+          "`~state_every` instead. Without the key: 1, every step.");
   map.get("nodes",
           "Nodes of rods and vertices of cloths that the tables of `simulate --csv` hold: a list if the scene has one "
           "object, otherwise a map from names of rods and cloths to lists. Objects that are not named, and threads, "
@@ -115,12 +114,8 @@ int findRecorded(const YamlCursor& at, const std::string& name, const Recorded& 
   }
   if (found == all.names.end())
   {
-    const std::string nearest = nearestWord(name, all.names);
-    std::vector<std::string> some(
-        all.names.begin(),
-        all.names.begin() + std::min<std::ptrdiff_t>(10, std::distance(all.names.begin(), all.names.end())));
-    at.problem("is no rod or cloth of the scene" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
-               "; it has: " + joinWords(some));
+    at.problem("is no rod or cloth of the scene" + didYouMean(name, all.names) +
+               "; it has: " + joinWords(all.names, 10));
     return -1;
   }
   if (std::find(found + 1, all.names.end(), name) != all.names.end())
@@ -164,9 +159,9 @@ NodeChoice readNodeChoice(const YamlCursor& at, const SceneConfig& scene)
 void completeRecord(const YamlCursor& at, SceneConfig& scene)
 {
   if (!scene.record.fields.empty() && at.problems().empty())
-    checkFields(YamlMap(at).find("fields"), scene);
+    checkFields(at.find("fields"), scene);
   if (at.isMap())
-    scene.record.nodes = readNodeChoice(YamlMap(at).find("nodes"), scene);
+    scene.record.nodes = readNodeChoice(at.find("nodes"), scene);
 }
 
 }   // namespace slender

@@ -82,10 +82,9 @@ Description describe(const std::string& description, const std::string& director
 std::set<std::string> readIgnoredLinks(const YamlCursor& at)
 {
   std::set<std::string> links;
-  if (at.present())
-    for (const YamlCursor& item : at.items())
-      if (const auto name = item.text())
-        links.insert(*name);
+  for (const YamlCursor& item : at.items())
+    if (const auto name = item.text())
+      links.insert(*name);
   return links;
 }
 
@@ -126,44 +125,33 @@ void readRobot(const YamlCursor& at, const ReadContext& context,
   std::string prefix;
   ObstacleConfig common;
   YamlMap map(at.sharesKeysOf("robot"));
-  const YamlCursor at_description = map.require(
-      "description",
-      "Robot description (URDF): a file, relative to the scene's or package://NAME/PATH; in a node also the name of a "
-      "ROS parameter, such as robot_description; or the text itself.");
+  const YamlCursor at_description =
+      map.require("description",
+                  "Robot description (URDF): a file, relative to the scene's or package://NAME/PATH; in a node also "
+                  "the name of a ROS parameter, such as robot_description; or the text itself.");
   const auto description = at_description.text();
-  assign(prefix, map.get("prefix",
-                         "Prefix of the links' names in tf: the frame of a link is PREFIX/LINK. Without the "
-                         "key the frame is LINK.")
-                     .text());
+  map.get("prefix", prefix,
+          "Prefix of the links' names in tf: the frame of a link is PREFIX/LINK. Without the key the frame is LINK.");
   options.ignored = readIgnoredLinks(map.get("ignore", "Names of links that nothing touches. Without the key: none."));
-  options.joints = readJoints(map.get("joints",
-                                      "Positions of joints at the start, until tf tells where the links are. Of "
-                                      "joints that are not named: 0."));
-  const YamlCursor pose = map.get("pose",
-                                  "Where the root link is at the start, until tf tells. Without the key: at the "
-                                  "origin, not turned.");
+  options.joints = readJoints(map.get(
+      "joints",
+      "Positions of joints at the start, until tf tells where the links are. Of joints that are not named: 0."));
+  const YamlCursor pose = map.get(
+      "pose", "Where the root link is at the start, until tf tells. Without the key: at the origin, not turned.");
   const Pose X_WR = readPose(pose).value_or(Pose());
-  assign(common.friction, map.get("friction",
-                                  "Coefficient of friction of all links, as of an obstacle. Without the key: that of "
-                                  "the other object.")
-                              .number(Range::closed(0, 100)));
+  map.get("friction", common.friction, Range::closed(0, 100),
+          "Coefficient of friction of all links, as of an obstacle. Without the key: that of the other object.");
   map.finish();
   if (!description)
     return;
   const std::size_t before = obstacles.size();
-  try
-  {
+  const bool good = at_description.attempt([&] {
     const Description robot = describe(*description, context.directory);
     options.resolve = [&](const std::string& name) { return filePath(name, robot.directory); };
     for (const UrdfLink& link : readUrdf(robot.text, options))
       addObstacles(link, common, X_WR, prefix, at, obstacles);
-  }
-  catch (const std::runtime_error& error)
-  {
-    at_description.problem(error.what());
-    return;
-  }
-  if (obstacles.size() == before)
+  });
+  if (good && obstacles.size() == before)
     at.warning("no link of the robot has a collision shape, or all are ignored: nothing touches it.");
 }
 

@@ -11,7 +11,6 @@ namespace slender {
 namespace {
 
 const Range radius = Range::above(0, 10, "m");
-const Range modulus = Range::above(0, 1e15, "N");
 const Range stiffness = Range::above(0, 1e15, "N m^2");
 
 void checkCount(const YamlCursor& at, std::size_t count, int edges)
@@ -26,8 +25,6 @@ void checkCount(const YamlCursor& at, std::size_t count, int edges)
 std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
 {
   at.takes("a number in (0, 1e+15] N m^2, [B1, B2] of such numbers, or [[B11, B12], [B12, B22]]");
-  if (!at.present())
-    return std::nullopt;
   if (!at.isList())
   {
     const auto alpha = at.number(stiffness);
@@ -55,10 +52,7 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
     }
   }
   if (std::abs(B(0, 1) - B(1, 0)) > 1e-9 * B.norm() || !(B(0, 0) > 0) || !(B.determinant() > 0))
-  {
-    at.problem("must be symmetric and positive definite");
-    return std::nullopt;
-  }
+    return at.problem("must be symmetric and positive definite");
   B(1, 0) = B(0, 1);
   return B;
 }
@@ -90,21 +84,20 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
 /// Edges of the rod as its curves give them; 0 when they could not be read or do not make a rod.
 int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
 {
-  const YamlCursor centerline = map.get(
-                       "centerline",
-                       "Rest shape of the rod, and the shape in which it starts unless `initial` is given. Give one "
-                       "kind of curve. Without the key: a straight line of 1 m along x with 50 edges."),
-                   initial = map.get("initial",
+  const YamlCursor centerline =
+      map.get("centerline",
+              "Rest shape of the rod, and the shape in which it starts unless `initial` is given. Give one kind of "
+              "curve. Without the key: a straight line of 1 m along x with 50 edges.");
+  const YamlCursor initial = map.get("initial",
                                      "Shape in which the rod starts, if it is not the rest shape. The edges keep their "
                                      "shares of the length. Without the key: the rest shape.");
   const std::size_t before = map.at().problems().size();
   assign(rod.centerline, readCurve(centerline, context));
   rod.initial = readCurve(initial, context);
   const YamlCursor director =
-      map.get("director",
+      map.get("director", rod.director, Range::closed(-1e6, 1e6),
               "Direction of the first material axis d1 at the first edge; the part along the edge does not count. The "
               "other edges follow without twist. Without the key some normal is chosen.");
-  assign(rod.director, director.vector3(Range::closed(-1e6, 1e6)));
   if (map.at().problems().size() != before)
     return 0;
   try
@@ -136,30 +129,18 @@ int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
   }
 }
 
-void checkInitial(YamlMap& map, const ReadContext& context, const RodConfig& rod)
-{
-  try
-  {
-    initialNodes(rod, restNodes(rod, context.gravity), context.gravity);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    map.find("initial").problem(error.what());
-  }
-}
-
 /// `rest_twist` and `natural_curvature` of a rod with so many edges (0: not known).
 void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
 {
   const YamlCursor at_twist = map.get("rest_twist",
                                       "Natural twist of the rod: the turn of the material frames about the centreline "
                                       "in the unloaded rod. A number is for the whole rod and is spread evenly; a list "
-                                      "has one entry per inner node (closed rod: per node). Without the key: 0."),
-                   at_curvature =
-                       map.get("natural_curvature",
-                               "Natural curvature [kappa1, kappa2] about d2 and -d1, in the frames that `rest_twist` "
-                               "turns: one pair for the whole rod, or a list of pairs, one per inner node (closed rod: "
-                               "per node). Without the key: the curvature of the centreline.");
+                                      "has one entry per inner node (closed rod: per node). Without the key: 0.");
+  const YamlCursor at_curvature =
+      map.get("natural_curvature",
+              "Natural curvature [kappa1, kappa2] about d2 and -d1, in the frames that `rest_twist` turns: one pair "
+              "for the whole rod, or a list of pairs, one per inner node (closed rod: per node). Without the key: the "
+              "curvature of the centreline.");
   const std::size_t joints = edges == 0 ? 0 : rod.closed ? edges : edges - 1;
   const auto checkJoints = [joints, &rod](const YamlCursor& at, std::size_t count) {
     if (joints > 0 && count != 1 && count != joints)
@@ -246,13 +227,12 @@ CrossSection readCrossSection(const YamlCursor& at, int edges)
   if (!at.present())
     return section;
   YamlMap map(at);
-  const YamlCursor
-      round = map.get(
-          "radius",
-          "Radius of a round section. One number, two for a taper from the first edge to the last, or one per edge."),
-      ellipse = map.get("ellipse",
-                        "Half-axes [a, b] of an elliptical section, a along d1 and b along d2. Each is one number, two "
-                        "for a taper, or one per edge.");
+  const YamlCursor round = map.get(
+      "radius",
+      "Radius of a round section. One number, two for a taper from the first edge to the last, or one per edge.");
+  const YamlCursor ellipse = map.get("ellipse",
+                                     "Half-axes [a, b] of an elliptical section, a along d1 and b along d2. Each is "
+                                     "one number, two for a taper, or one per edge.");
   map.finish();
   if (at.isMap() && round.present() == ellipse.present())
   {
@@ -317,38 +297,30 @@ Material readMaterial(const YamlCursor& at)
 {
   Material material;
   YamlMap map(at.sharesKeysOf("rods.N.material"));
-  assign(material.density,
-         map.get("density", "Mass per volume. Without the key: 1000 kg/m^3.").number(Range::above(0, 1e6, "kg/m^3")));
+  map.get("density", material.density, Range::above(0, 1e6, "kg/m^3"),
+          "Mass per volume. Without the key: 1000 kg/m^3.");
   const YamlCursor at_youngs =
-      map.get("youngs_modulus",
+      map.get("youngs_modulus", material.youngs_modulus, Range::above(0, 1e15, "Pa"),
               "Young's modulus E. Moduli that are not given follow from it and the section. Without the key: 1e6 Pa; "
               "it must be given if only some of stretch_modulus, bend_modulus and twist_modulus are.");
-  assign(material.youngs_modulus, at_youngs.number(Range::above(0, 1e15, "Pa")));
-  assign(material.poissons_ratio,
-         map.get("poissons_ratio", "Poisson's ratio, which gives the shear modulus. Without the key: 0.5.")
-             .number(Range::above(-1, 0.5)));
-  assign(material.torsion,
-         map.get("torsion",
-                 "How the twisting stiffness follows from the section: polar takes G times the polar moment of area, "
-                 "saint_venant the exact value of an ellipse. Both agree for round sections. Without the key: polar.")
-             .choice<Torsion>({{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}}));
-  material.linear_density = map.get("linear_density", "Mass per length, in place of density times area.")
-                                .number(Range::above(0, 1e6, "kg/m"));
-  material.stretch_modulus =
-      map.get("stretch_modulus", "Force per strain (E A), in place of what follows from youngs_modulus.")
-          .number(modulus);
-  assign(material.inextensible, map.get("inextensible",
-                                        "Whether the stretching modulus is raised until the rod's own weight stretches "
-                                        "it by 1e-5 at most. It has no effect without gravity. Without the key: false.")
-                                    .boolean());
+  map.get("poissons_ratio", material.poissons_ratio, Range::above(-1, 0.5),
+          "Poisson's ratio, which gives the shear modulus. Without the key: 0.5.");
+  map.get("torsion", material.torsion, {{"polar", Torsion::polar}, {"saint_venant", Torsion::saint_venant}},
+          "How the twisting stiffness follows from the section: polar takes G times the polar moment of area, "
+          "saint_venant the exact value of an ellipse. Both agree for round sections. Without the key: polar.");
+  map.get("linear_density", material.linear_density, Range::above(0, 1e6, "kg/m"),
+          "Mass per length, in place of density times area.");
+  map.get("stretch_modulus", material.stretch_modulus, Range::above(0, 1e15, "N"),
+          "Force per strain (E A), in place of what follows from youngs_modulus.");
+  map.get("inextensible", material.inextensible,
+          "Whether the stretching modulus is raised until the rod's own weight stretches it by 1e-5 at most. It has no "
+          "effect without gravity. Without the key: false.");
   material.bend_modulus =
       readBendModulus(map.get("bend_modulus",
                               "Moment per curvature (E I), in place of what follows from youngs_modulus: a number, "
                               "[B1, B2] for bending towards d1 and d2, or a symmetric 2x2 matrix."));
-  material.twist_modulus =
-      map.get("twist_modulus",
-              "Moment per twist rate (G J), in place of what follows from youngs_modulus and poissons_ratio.")
-          .number(stiffness);
+  map.get("twist_modulus", material.twist_modulus, stiffness,
+          "Moment per twist rate (G J), in place of what follows from youngs_modulus and poissons_ratio.");
   map.finish();
   checkModuli(map, at_youngs);
   return material;
@@ -358,20 +330,13 @@ Damping readDamping(const YamlCursor& at)
 {
   Damping damping;
   YamlMap map(at.sharesKeysOf("rods.N.damping"));
-  assign(damping.mass,
-         map.get("mass",
-                 "Damping of the motion against the world: the force on a mass m is -mass m v. Without the key: 0.")
-             .number(Range::closed(0, 1e6, "1/s")));
-  assign(damping.stiffness, map.get("stiffness",
-                                    "Damping of deformation (Rayleigh): it acts like the stiffness times this time, on "
-                                    "the rate of the strain. Without the key: 0.")
-                                .number(Range::closed(0, 1e3, "s")));
-  assign(
-      damping.drag,
-      map.get(
-             "drag",
-             "Drag force per length and per velocity relative to the wind. Without the key: 0, and wind has no effect.")
-          .number(Range::closed(0, 1e6, "N s/m^2")));
+  map.get("mass", damping.mass, Range::closed(0, 1e6, "1/s"),
+          "Damping of the motion against the world: the force on a mass m is -mass m v. Without the key: 0.");
+  map.get("stiffness", damping.stiffness, Range::closed(0, 1e3, "s"),
+          "Damping of deformation (Rayleigh): it acts like the stiffness times this time, on the rate of the strain. "
+          "Without the key: 0.");
+  map.get("drag", damping.drag, Range::closed(0, 1e6, "N s/m^2"),
+          "Drag force per length and per velocity relative to the wind. Without the key: 0, and wind has no effect.");
   map.finish();
   return damping;
 }
@@ -390,19 +355,14 @@ void readTraits(YamlMap& map, RodConfig& rod)
     rod.automatic_curvature = false;
     rod.joints.curvature = **curvature;
   }
-  assign(rod.formulation,
-         map.get("formulation",
-                 "Equations of explicit steps (integrator symplectic_euler): `isotropic` is cheaper, and is for "
-                 "naturally straight rods that bend alike in all directions; `general` is for all rods. Without the "
-                 "key, or with auto: isotropic where it applies. Implicit steps always take general.")
-             .choice<Formulation>({{"auto", Formulation::automatic},
-                                   {"isotropic", Formulation::isotropic},
-                                   {"general", Formulation::general}}));
-  assign(rod.stretching,
-         map.get("stretching",
-                 "`stiff` lets edges stretch by their modulus. `projected` keeps the length of every edge by a "
-                 "projection after each explicit step (integrator symplectic_euler). Without the key: stiff.")
-             .choice<Stretching>({{"stiff", Stretching::stiff}, {"projected", Stretching::projected}}));
+  map.get("formulation", rod.formulation,
+          {{"auto", Formulation::automatic}, {"isotropic", Formulation::isotropic}, {"general", Formulation::general}},
+          "Equations of explicit steps (integrator symplectic_euler): `isotropic` is cheaper, and is for naturally "
+          "straight rods that bend alike in all directions; `general` is for all rods. Without the key, or with auto: "
+          "isotropic where it applies. Implicit steps always take general.");
+  map.get("stretching", rod.stretching, {{"stiff", Stretching::stiff}, {"projected", Stretching::projected}},
+          "`stiff` lets edges stretch by their modulus. `projected` keeps the length of every edge by a projection "
+          "after each explicit step (integrator symplectic_euler). Without the key: stiff.");
   rod.material = readMaterial(
       map.get("material", "Density and stiffness of the rod. Without the key: the defaults of the keys in it."));
   rod.damping = readDamping(map.get("damping", "Damping of the rod. Without the key: none."));
@@ -417,36 +377,30 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
   RodConfig rod;
   YamlMap map(at);
   rod.name = default_name;
-  assign(rod.name, map.get("name",
-                           "Name of the rod, which topics, tables and other keys use. Without the key: rod if there is "
-                           "one rod, otherwise rod0, rod1, ...")
-                       .name());
-  assign(rod.closed,
-         map.get("closed",
-                 "Whether the rod is a loop: one more edge joins its last node to its first. Without the key: false.")
-             .boolean());
-  assign(rod.naturally_straight, map.get("naturally_straight",
-                                         "Whether the unloaded rod is straight, also where the centreline is curved. "
-                                         "Without the key: false, the rest curvature is that of the centreline.")
-                                     .boolean());
+  map.getName(rod.name,
+              "Name of the rod, which topics, tables and other keys use. Without the key: rod if there is one rod, "
+              "otherwise rod0, rod1, ...");
+  map.get("closed", rod.closed,
+          "Whether the rod is a loop: one more edge joins its last node to its first. Without the key: false.");
+  map.get("naturally_straight", rod.naturally_straight,
+          "Whether the unloaded rod is straight, also where the centreline is curved. Without the key: false, the rest "
+          "curvature is that of the centreline.");
   const YamlCursor matched =
-      map.get("matched_to_arcs",
+      map.get("matched_to_arcs", rod.joints.matched_to_arcs,
               "Whether each joint is as stiff as the arc of the smooth curve that it stands for. Coils of few edges "
               "become about ten times more accurate. Not for naturally straight rods. Without the key: false.");
-  assign(rod.joints.matched_to_arcs, matched.boolean());
   if (rod.joints.matched_to_arcs && rod.naturally_straight)
   {
     matched.problem(
         "must not be true of a rod with naturally_straight: true, which has no arcs to match its joints to");
   }
-  assign(rod.initial_twist, map.get("initial_twist",
-                                    "Twist of the whole rod in the shape in which it starts, beyond the rest twist, "
-                                    "spread evenly. Without the key: 0.")
-                                .number(Range::closed(-1e5, 1e5, "rad")));
+  map.get("initial_twist", rod.initial_twist, Range::closed(-1e5, 1e5, "rad"),
+          "Twist of the whole rod in the shape in which it starts, beyond the rest twist, spread evenly. Without the "
+          "key: 0.");
   const int edges = readCenterline(map, context, rod);
   readNaturalFrames(map, rod, edges);
   if (edges > 0 && rod.initial)
-    checkInitial(map, context, rod);
+    map.find("initial").attempt([&] { initialNodes(rod, restNodes(rod, context.gravity), context.gravity); });
   const YamlCursor at_section =
       map.get("cross_section",
               "Cross-section of the rod: give either `radius` or `ellipse`. Without the key: a radius of 0.005 m.");
@@ -464,11 +418,10 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
   rod.tracking =
       readTrackedCurve(map.get("track", "Guide curve whose averages the rod has in every step. Without the key: none."),
                        context, rod, edges);
-  rod.broadcast_tf = readSectionFrames(
-      map.get("broadcast_tf",
-              "Sections whose frames (x along the tangent, y along d1) nodes publish on tf, as NODE/rods/ROD/NAME. "
-              "Without the key: none."),
-      rod.closed, edges);
+  rod.broadcast_tf = readSectionFrames(map.get("broadcast_tf",
+                                               "Sections whose frames (x along the tangent, y along d1) nodes publish "
+                                               "on tf, as NODE/rods/ROD/NAME. Without the key: none."),
+                                       rod.closed, edges);
   map.finish();
   return {std::move(rod), edges};
 }

@@ -15,7 +15,6 @@ namespace slender {
 
 namespace {
 
-const Range size = Range::above(0, kMaxCoordinate, "m");
 const Range friction = Range::closed(0, 100);
 
 Eigen::Quaterniond fromRpy(const Eigen::Vector3d& rpy)
@@ -28,9 +27,9 @@ Eigen::Quaterniond fromRpy(const Eigen::Vector3d& rpy)
 
 Plane readPlane(YamlMap& map, std::optional<Pose>& pose)
 {
-  const YamlCursor point = map.get("point", "A point of the surface, in place of `pose`. Without the key: the origin."),
-                   normal = map.get("normal",
-                                    "Direction out of the solid, in place of `pose`. Without the key: z of the pose.");
+  const YamlCursor point = map.get("point", "A point of the surface, in place of `pose`. Without the key: the origin.");
+  const YamlCursor normal =
+      map.get("normal", "Direction out of the solid, in place of `pose`. Without the key: z of the pose.");
   if (!point.present() && !normal.present())
     return {};
   if (pose)
@@ -55,45 +54,35 @@ template <class Round>
 Round readRound(YamlMap& map)
 {
   Round shape;
-  assign(shape.radius, map.get("radius", "Radius about the z axis of the shape. Without the key: 0.1 m.").number(size));
-  assign(shape.length,
-         map.get("length",
-                 "Length along the z axis of the shape, without the round ends of a capsule. Without the key: 0.2 m.")
-             .number(size));
+  map.get("radius", shape.radius, kLength, "Radius about the z axis of the shape. Without the key: 0.1 m.");
+  map.get("length", shape.length, kLength,
+          "Length along the z axis of the shape, without the round ends of a capsule. Without the key: 0.2 m.");
   return shape;
 }
 
 Box readBox(YamlMap& map)
 {
   Box box;
-  assign(
-      box.size,
-      map.get("size", "Lengths of the edges along the axes of the shape. Without the key: 0.1 m each.").vector3(size));
+  map.get("size", box.size, kLength, "Lengths of the edges along the axes of the shape. Without the key: 0.1 m each.");
   return box;
 }
 
 std::optional<Shape> readMesh(YamlMap& map, const ReadContext& context)
 {
   const YamlCursor file = map.require("file", "OBJ file with a closed triangle mesh.");
-  const double scale =
-      map.get("scale", "Factor by which the coordinates of the file are multiplied. Without the key: 1.")
-          .number(Range::above(0, 1e6))
-          .value_or(1.0);
+  double scale = 1.0;
+  map.get("scale", scale, Range::above(0, 1e6),
+          "Factor by which the coordinates of the file are multiplied. Without the key: 1.");
   const auto path = file.text();
   if (!path)
     return std::nullopt;
-  try
-  {
+  auto mesh = std::make_shared<TriangleMesh>();
+  const bool good = file.attempt([&] {
     requireRegularFile(context.resolve(*path));
-    auto mesh = std::make_shared<TriangleMesh>(readObj(context.resolve(*path)));
+    *mesh = readObj(context.resolve(*path));
     mesh->vertices *= scale;
-    return Shape(std::shared_ptr<const TriangleMesh>(std::move(mesh)));
-  }
-  catch (const std::runtime_error& error)
-  {
-    file.problem(error.what());
-    return std::nullopt;
-  }
+  });
+  return good ? std::optional<Shape>(std::move(mesh)) : std::nullopt;
 }
 
 }   // namespace
@@ -105,13 +94,13 @@ std::optional<Pose> readPose(const YamlCursor& at)
     return std::nullopt;
   Pose pose;
   YamlMap map(at);
-  assign(pose.position, map.get("position", "Position of the origin of the shape or mesh. Without the key: [0, 0, 0].")
-                            .vector3(kCoordinate));
-  const YamlCursor orientation = map.get("orientation",
-                                         "Orientation as a unit quaternion [x, y, z, w]. Give either `orientation` or "
-                                         "`rpy`. Without both: not turned."),
-                   rpy = map.get("rpy",
-                                 "Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order.");
+  map.get("position", pose.position, kCoordinate,
+          "Position of the origin of the shape or mesh. Without the key: [0, 0, 0].");
+  const YamlCursor orientation = map.get(
+      "orientation",
+      "Orientation as a unit quaternion [x, y, z, w]. Give either `orientation` or `rpy`. Without both: not turned.");
+  const YamlCursor rpy =
+      map.get("rpy", "Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order.");
   orientation.takes("a unit quaternion [x, y, z, w]");
   map.finish();
   if (orientation.present() && rpy.present())
@@ -129,14 +118,7 @@ std::optional<Pose> readPose(const YamlCursor& at)
     else if (entries)
     {
       const double numbers[7] = {0, 0, 0, (*entries)[0], (*entries)[1], (*entries)[2], (*entries)[3]};
-      try
-      {
-        pose.orientation = checkedPose(numbers).orientation;
-      }
-      catch (const std::invalid_argument& error)
-      {
-        orientation.problem(error.what());
-      }
+      orientation.attempt([&] { pose.orientation = checkedPose(numbers).orientation; });
     }
   }
   else if (const auto angles = rpy.vector3(Range::closed(-100, 100, "rad")))
@@ -153,10 +135,7 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
     return std::nullopt;
   const std::size_t before = at.problems().size();
   if (!at.isMap())
-  {
-    at.problem("must be a map with one shape and its measures, e.g. {plane: {}} or {sphere: {radius: 0.1}}");
-    return std::nullopt;
-  }
+    return at.problem("must be a map with one shape and its measures, e.g. {plane: {}} or {sphere: {radius: 0.1}}");
   YamlMap kinds(at);
   std::optional<Shape> shape;
   int given = 0;
@@ -174,7 +153,7 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
        [&](YamlMap& map) { return readPlane(map, pose); });
   read("sphere", "A sphere about the origin of the pose.", [](YamlMap& map) {
     Sphere sphere;
-    assign(sphere.radius, map.get("radius", "Radius. Without the key: 0.1 m.").number(size));
+    map.get("radius", sphere.radius, kLength, "Radius. Without the key: 0.1 m.");
     return sphere;
   });
   read("box", "A box, centred at the origin of the pose.", readBox);
@@ -187,18 +166,8 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
     at.problem("names " + std::to_string(given) +
                " shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh");
   }
-  if (at.problems().size() != before)
-    return std::nullopt;
-  try
-  {
-    checkShape(*shape);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at.problem(error.what());
-    return std::nullopt;
-  }
-  return shape;
+  const bool good = at.problems().size() == before && at.attempt([&] { checkShape(*shape); });
+  return good ? shape : std::nullopt;
 }
 
 std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool of_cloth)
@@ -208,31 +177,24 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
     return std::nullopt;
   ContactProperties contact;
   YamlMap map(at);
-  assign(contact.self, map.get("self", "Whether the object touches itself. Without the key: true.").boolean());
-  assign(contact.others,
-         map.get(others, "Whether the object touches others of its kind that have contact. Without the key: true.")
-             .boolean());
-  assign(contact.solids,
-         map.get("obstacles", "Whether the object touches obstacles and bodies. Without the key: true.").boolean());
-  assign(contact.friction, map.get("friction",
-                                   "Coefficient of friction. Between two objects the geometric mean of both "
-                                   "coefficients counts. Without the key: 0.3.")
-                               .number(friction));
+  map.get("self", contact.self, "Whether the object touches itself. Without the key: true.");
+  map.get(others, contact.others,
+          "Whether the object touches others of its kind that have contact. Without the key: true.");
+  map.get("obstacles", contact.solids, "Whether the object touches obstacles and bodies. Without the key: true.");
+  map.get("friction", contact.friction, friction,
+          "Coefficient of friction. Between two objects the geometric mean of both coefficients counts. Without the "
+          "key: 0.3.");
   if (of_cloth)
   {
-    assign(contact.thickness, map.get("thickness",
-                                      "Distance of two layers of cloth in contact; of two cloths the mean counts, and "
-                                      "half of it from an obstacle. Without the key: 0.001 m.")
-                                  .number(Range::above(0, 1, "m")));
-    assign(
-        contact.method,
-        map.get("method",
-                "`barrier` makes contact a part of the step, so that cloth meets everything that has contact. "
-                "`impulses` correct the end of the step: cheaper, but for cloth, obstacles and driven bodies only. "
-                "Without the key: barrier if rods, threads, simulated bodies or another cloth with barrier have "
-                "contact, otherwise impulses; a cloth that has a max_traction or more than 500 test functions, or is a "
-                "guide, always takes impulses.")
-            .choice<ContactMethod>({{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}}));
+    map.get("thickness", contact.thickness, Range::above(0, 1, "m"),
+            "Distance of two layers of cloth in contact; of two cloths the mean counts, and half of it from an "
+            "obstacle. Without the key: 0.001 m.");
+    map.get(
+        "method", contact.method, {{"barrier", ContactMethod::barrier}, {"impulses", ContactMethod::impulses}},
+        "`barrier` makes contact a part of the step, so that cloth meets everything that has contact. `impulses` "
+        "correct the end of the step: cheaper, but for cloth, obstacles and driven bodies only. Without the key: "
+        "barrier if rods, threads, simulated bodies or another cloth with barrier have contact, otherwise impulses; a "
+        "cloth that has a max_traction or more than 500 test functions, or is a guide, always takes impulses.");
   }
   map.finish();
   return contact;
@@ -275,17 +237,14 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
         gap = std::min(gap, 5e-3 * boundingRadius(*body.shape));
   const bool any = std::isfinite(gap);
   contact.gap = any ? gap : 0.0;
-  assign(contact.gap,
-         map.get("gap",
-                 "Distance of two surfaces at which they begin to repel each other. Without the key: a tenth of the "
-                 "smallest radius of the rods and threads with contact (of a nozzle a quarter of its radius counts), "
-                 "and at most half the smallest thickness of cloths with method barrier. If only simulated bodies "
-                 "touch: 0.005 times their smallest bounding radius.")
-             .number(Range::above(0, 1, "m")));
-  assign(contact.slip_speed, map.get("slip_speed",
-                                     "Friction that sticks is a spring, which slips when it is stretched by this speed "
-                                     "times time.step. Without the key: 1e-4 m/s.")
-                                 .number(Range::above(0, 10, "m/s")));
+  map.get("gap", contact.gap, Range::above(0, 1, "m"),
+          "Distance of two surfaces at which they begin to repel each other. Without the key: a tenth of the smallest "
+          "radius of the rods and threads with contact (of a nozzle a quarter of its radius counts), and at most half "
+          "the smallest thickness of cloths with method barrier. If only simulated bodies touch: 0.005 times their "
+          "smallest bounding radius.");
+  map.get("slip_speed", contact.slip_speed, Range::above(0, 10, "m/s"),
+          "Friction that sticks is a spring, which slips when it is stretched by this speed times time.step. Without "
+          "the key: 1e-4 m/s.");
   map.finish();
   if (at.present() && !any && at.problems().size() == before)
   {
@@ -307,19 +266,17 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
     ObstacleConfig obstacle;
     YamlMap map(entries[k]);
     obstacle.name = entries.size() == 1 ? "obstacle" : "obstacle" + std::to_string(k);
-    assign(obstacle.name, map.get("name",
-                                  "Name of the obstacle; bodies and obstacles need different names. Without the key: "
-                                  "obstacle if there is one obstacle, otherwise obstacle0, obstacle1, ...")
-                              .name());
+    map.getName(obstacle.name,
+                "Name of the obstacle; bodies and obstacles need different names. Without the key: obstacle if there "
+                "is one obstacle, otherwise obstacle0, obstacle1, ...");
     const YamlCursor at_pose = map.get("pose",
                                        "Where the shape is at the start. Without the key: at the origin, not turned. "
                                        "Not with a table of poses, whose first pose it would contradict.");
     std::optional<Pose> pose = readPose(at_pose);
     assign(obstacle.shape, readShape(map.require("shape", "Shape of the obstacle: give one."), context, pose));
-    assign(obstacle.friction, map.get("friction",
-                                      "Coefficient of friction. Between two objects the geometric mean of both "
-                                      "coefficients counts. Without the key: that of the other object.")
-                                  .number(friction));
+    map.get("friction", obstacle.friction, friction,
+            "Coefficient of friction. Between two objects the geometric mean of both coefficients counts. Without the "
+            "key: that of the other object.");
     assign(obstacle.motion,
            readSolidMotion(map.get("motion", "How the obstacle moves. Without the key: it stands."), context, false));
     if (const auto* table = std::get_if<TableMotion>(&obstacle.motion))

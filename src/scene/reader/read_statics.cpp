@@ -12,10 +12,10 @@ const Range factor_range = Range::closed(-most_factor, most_factor);
 void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
 {
   const YamlCursor at =
-                       map.get("at",
-                               "Where the load acts, as an arc length of the rest shape from the first node, or at the "
-                               "rod's start or end. Between two nodes both bear the load. Give either `at` or `node`."),
-                   node = map.get("node", "Node on which the load acts. Give either `at` or `node`.");
+      map.get("at",
+              "Where the load acts, as an arc length of the rest shape from the first node, or at the rod's start or "
+              "end. Between two nodes both bear the load. Give either `at` or `node`.");
+  const YamlCursor node = map.get("node", "Node on which the load acts. Give either `at` or `node`.");
   if (at.present() == node.present())
   {
     if (map.at().isMap())
@@ -29,10 +29,9 @@ void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
       load.node = *index < 0 ? *index + nodes : *index;
     return;
   }
-  const std::string word = at.isScalar() ? at.tree()->scalar : "";
-  if (word == "start" || word == "end")
+  if (at.isWord("start") || at.isWord("end"))
   {
-    load.node = word == "start" ? 0 : nodes - 1;
+    load.node = at.isWord("start") ? 0 : nodes - 1;
     if (closed)
       at.problem("is not for a closed rod, which has no ends; give an arc length [m], or node: INDEX");
     return;
@@ -45,21 +44,19 @@ RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
   RodLoadConfig load;
   YamlMap map(at);
   readLoadPlace(map, closed, edges, load);
-  const YamlCursor force = map.get("force",
-                                   "Force that keeps its size and its direction in the world. Without the key: none."),
-                   torque = map.get(
-                       "torque",
-                       "Torque about the tangent of the rod, right-handed about the direction from the first node to "
-                       "the last. A bending moment is a couple of forces instead. Without the key: none.");
+  const YamlCursor force =
+      map.get("force", "Force that keeps its size and its direction in the world. Without the key: none.");
+  const YamlCursor torque =
+      map.get("torque",
+              "Torque about the tangent of the rod, right-handed about the direction from the first node to the last. "
+              "A bending moment is a couple of forces instead. Without the key: none.");
   assign(load.force, force.vector3(Range::closed(-1e15, 1e15, "N")));
   if (torque.isList())
   {
     torque.problem(
         "is a vector, and a torque that keeps its direction in the world has no potential: its work depends on the way "
-        "that the rod turns, so "
-        "that no energy tells which equilibrium is stable; must be a number [N m] about the tangent. For a bending "
-        "moment give a couple: force: "
-        "F at one node and force: -F at the next");
+        "that the rod turns, so that no energy tells which equilibrium is stable; must be a number [N m] about the "
+        "tangent. For a bending moment give a couple: force: F at one node and force: -F at the next");
   }
   else
   {
@@ -77,13 +74,11 @@ std::optional<PathConfig> readPath(const YamlCursor& at)
     return std::nullopt;
   PathConfig path;
   YamlMap map(at);
-  assign(path.from, map.get("from", "Load factor of the first equilibrium. Without the key: 0.").number(factor_range));
-  const YamlCursor to = map.get("to", "Load factor at which the path ends. Without the key: 1.");
-  assign(path.to, to.number(factor_range));
-  assign(path.steps, map.get("steps",
-                             "Number of steps of equal length along the path, if nothing moves; more are taken where "
-                             "the rod moves. Without the key: 20.")
-                         .integer(1, 100'000));
+  map.get("from", path.from, factor_range, "Load factor of the first equilibrium. Without the key: 0.");
+  const YamlCursor to = map.get("to", path.to, factor_range, "Load factor at which the path ends. Without the key: 1.");
+  map.get("steps", path.steps, Range::closed(1, 100'000),
+          "Number of steps of equal length along the path, if nothing moves; more are taken where the rod moves. "
+          "Without the key: 20.");
   if (path.from == path.to)
     to.problem("is the factor that the path starts from; must differ from it");
   map.finish();
@@ -99,10 +94,9 @@ std::optional<double> readBuckling(const YamlCursor& at)
   if (at.isMap())
   {
     YamlMap map(at);
-    const double up_to =
-        map.get("up_to", "Largest load factor up to which the critical one is looked for. Without the key: 1000000.")
-            .number(Range::above(0, most_factor))
-            .value_or(kFarEnough);
+    double up_to = kFarEnough;
+    map.get("up_to", up_to, Range::above(0, most_factor),
+            "Largest load factor up to which the critical one is looked for. Without the key: 1000000.");
     map.finish();
     return up_to;
   }
@@ -129,9 +123,8 @@ std::string whyNotAlone(const SceneConfig& scene)
 std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, bool closed, int edges)
 {
   std::vector<RodLoadConfig> loads;
-  if (at.present())
-    for (const YamlCursor& item : at.items(1, 10'000))
-      loads.push_back(readRodLoad(item, closed, edges));
+  for (const YamlCursor& item : at.items(1, 10'000))
+    loads.push_back(readRodLoad(item, closed, edges));
   return loads;
 }
 
@@ -144,18 +137,15 @@ StartConfig readStart(const YamlCursor& at)
     return start;
   }
   YamlMap map(at);
-  assign(start.equilibrium, map.get("equilibrium",
-                                    "Whether the static solver runs before the first step, so that the scene starts at "
-                                    "a stable equilibrium. Without the key: false.")
-                                .boolean());
-  const YamlCursor keep = map.get("keep_velocities",
+  map.get("equilibrium", start.equilibrium,
+          "Whether the static solver runs before the first step, so that the scene starts at a stable equilibrium. "
+          "Without the key: false.");
+  const YamlCursor keep = map.get("keep_velocities", start.keep_velocities,
                                   "Whether simulated bodies have their `velocity` at the equilibrium. Without the key: "
                                   "false, everything is at rest.");
-  assign(start.keep_velocities, keep.boolean());
-  assign(start.accept_unstable, map.get("accept_unstable",
-                                        "Whether an unstable equilibrium is accepted with a warning. Without the key: "
-                                        "false, such a scene is refused.")
-                                    .boolean());
+  map.get(
+      "accept_unstable", start.accept_unstable,
+      "Whether an unstable equilibrium is accepted with a warning. Without the key: false, such a scene is refused.");
   map.finish();
   if (start.keep_velocities && !start.equilibrium)
     keep.problem("needs equilibrium: true; a scene that starts as given keeps all velocities anyway");
@@ -170,14 +160,14 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
   YamlMap map(at);
   const YamlCursor factors = map.get("factors",
                                      "Load factors at each of which a stable equilibrium is found, each from the one "
-                                     "before. Without `factors` and `path`: one equilibrium at the factor 1."),
-                   path = map.get("path",
+                                     "before. Without `factors` and `path`: one equilibrium at the factor 1.");
+  const YamlCursor path = map.get("path",
                                   "Equilibria, stable or not, that are followed while the load factor grows, also "
-                                  "through folds. For scenes of one rod without contact, bodies and cloth."),
-                   perturbation = map.get("perturbation",
-                                          "Imperfection that rounds branch points off: forces along the lowest mode of "
-                                          "the first equilibrium, whose sizes sum to this share of the scaled loads. A "
-                                          "negative number pushes to the other side. Without the key: 0.");
+                                  "through folds. For scenes of one rod without contact, bodies and cloth.");
+  const YamlCursor perturbation = map.get(
+      "perturbation",
+      "Imperfection that rounds branch points off: forces along the lowest mode of the first equilibrium, whose sizes "
+      "sum to this share of the scaled loads. A negative number pushes to the other side. Without the key: 0.");
   if (const auto values = factors.numbers(factor_range))
   {
     statics.factors = *values;
@@ -187,12 +177,10 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
   statics.path = readPath(path);
   if (factors.present() && path.present())
     path.problem("and factors are two ways to choose the factors; leave one of them out");
-  assign(statics.scales,
-         map.get("scales",
-                 "Which loads the load factor multiplies: gravity, the `loads` of rods and cloths, or both. Without "
-                 "the key: all.")
-             .choice<FactorScales>(
-                 {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}}));
+  map.get("scales", statics.scales,
+          {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}},
+          "Which loads the load factor multiplies: gravity, the `loads` of rods and cloths, or both. Without the key: "
+          "all.");
   assign(statics.perturbation, perturbation.number(Range::closed(-1, 1)));
   statics.buckling =
       readBuckling(map.get("buckling",

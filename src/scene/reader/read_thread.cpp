@@ -12,8 +12,6 @@ namespace slender {
 
 namespace {
 
-const Range length = Range::above(0, kMaxCoordinate, "m");
-
 /// A number, {table: [[t, value], ...]} or {topic: true, initial: value}.
 TimedNumber readTimed(const YamlCursor& at, const Range& range)
 {
@@ -26,10 +24,10 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
     return timed;
   }
   YamlMap map(at);
-  const YamlCursor topic = map.get("topic", "Must be true: the value comes by messages."),
-                   initial = map.get("initial", "Value until the first message. Without the key: 0."),
-                   table = map.get(
-                       "table", "Values over time: rows [t, value] with t in s. Values between rows are interpolated.");
+  const YamlCursor topic = map.get("topic", "Must be true: the value comes by messages.");
+  const YamlCursor initial = map.get("initial", "Value until the first message. Without the key: 0.");
+  const YamlCursor table =
+      map.get("table", "Values over time: rows [t, value] with t in s. Values between rows are interpolated.");
   initial.takes("a number in the range of the key above");
   map.finish();
   if (topic.present() == table.present())
@@ -59,14 +57,7 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
       if (time && value)
         entries.push_back({*time, *value});
     }
-    try
-    {
-      timed.table = NumberTable(std::move(entries));
-    }
-    catch (const std::invalid_argument& error)
-    {
-      table.problem(error.what());
-    }
+    table.attempt([&] { timed.table = NumberTable(std::move(entries)); });
   }
   return timed;
 }
@@ -75,11 +66,11 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
 {
   NozzleConfig nozzle;
   YamlMap map(at);
-  assign(nozzle.diameter, map.require("diameter", "Inner diameter of the nozzle.").number(Range::above(0, 10, "m")));
-  const YamlCursor position = map.get("position", "Centre of the outlet. Without the key: [0, 0, 0]."),
-                   direction =
-                       map.get("direction", "Direction of the flow out of the nozzle. Without the key: [0, 0, -1].");
-  assign(nozzle.pose.position, position.vector3(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
+  map.require("diameter", nozzle.diameter, Range::above(0, 10, "m"), "Inner diameter of the nozzle.");
+  const YamlCursor position =
+      map.get("position", nozzle.pose.position, kCoordinate, "Centre of the outlet. Without the key: [0, 0, 0].");
+  const YamlCursor direction =
+      map.get("direction", "Direction of the flow out of the nozzle. Without the key: [0, 0, -1].");
   const Eigen::Vector3d along = readDirection(direction, -Eigen::Vector3d::UnitZ());
   nozzle.pose.orientation = rotationBetween(Eigen::Vector3d::UnitX(), along);
   const YamlCursor flow = map.get("flow",
@@ -92,10 +83,9 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
                                                 "along the flow. Without the key: it stands."),
                                         context, false));
   const YamlCursor at_swirl =
-      map.get("swirl",
+      map.get("swirl", swirl, Range::closed(0, 1, "of the coil's radius"),
               "Radius of the circle in which the nozzle starts, so that the thread coils at once; it stands after the "
               "first turns of the coil. Without the key: 0, the nozzle stands.");
-  assign(swirl, at_swirl.number(Range::closed(0, 1, "of the coil's radius")));
   if (swirl > 0 && !std::holds_alternative<FixedMotion>(nozzle.motion))
     at_swirl.problem("is for nozzles that stand; this one has a motion of its own");
   if (const auto* table = std::get_if<TableMotion>(&nozzle.motion))
@@ -116,8 +106,7 @@ FloorConfig readFloor(const YamlCursor& at)
   FloorConfig floor;
   const Range speed = Range::closed(-kMaxBeltSpeed, kMaxBeltSpeed, "m/s");
   YamlMap map(at);
-  assign(floor.height, map.get("height", "Height (z) of the floor. Without the key: 0.")
-                           .number(Range::closed(-kMaxCoordinate, kMaxCoordinate, "m")));
+  map.get("height", floor.height, kCoordinate, "Height (z) of the floor. Without the key: 0.");
   const YamlCursor belt =
       map.get("belt", "Velocity of the floor: [vx, vy], or a map. Without the key: the floor stands.");
   if (belt.isMap())
@@ -125,11 +114,11 @@ FloorConfig readFloor(const YamlCursor& at)
     YamlMap velocity(belt);
     const YamlCursor x = velocity.get("x",
                                       "Velocity along x: a number, a table over time, or values by messages on "
-                                      "`belt/velocity`, each of which sets both velocities. Without the key: 0."),
-                     y = velocity.get("y",
+                                      "`belt/velocity`, each of which sets both velocities. Without the key: 0.");
+    const YamlCursor y = velocity.get("y",
                                       "Velocity along y: a number, a table over time, or values by messages on "
-                                      "`belt/velocity`, each of which sets both velocities. Without the key: 0."),
-                     topic = velocity.get("topic",
+                                      "`belt/velocity`, each of which sets both velocities. Without the key: 0.");
+    const YamlCursor topic = velocity.get("topic",
                                           "Whether messages on `belt/velocity` set both velocities; `x` and `y` hold "
                                           "until the first one. Without the key: false.");
     velocity.finish();
@@ -140,9 +129,8 @@ FloorConfig readFloor(const YamlCursor& at)
     const bool of_both = topic.present() && topic.boolean().value_or(true);
     if (!of_both && x.present() && y.present() && floor.belt_x.topic != floor.belt_y.topic)
       belt.problem(
-          "one of x and y comes by messages and the other one does not, but each message on belt/velocity "
-          "sets both; write topic: true beside x and y, whose numbers and tables then hold until the first "
-          "message");
+          "one of x and y comes by messages and the other one does not, but each message on belt/velocity sets both; "
+          "write topic: true beside x and y, whose numbers and tables then hold until the first message");
     if (of_both)
       floor.belt_x.topic = floor.belt_y.topic = true;
   }
@@ -161,14 +149,12 @@ FloorConfig readFloor(const YamlCursor& at)
       floor.belt_y.table = NumberTable({{0.0, (*velocity)[1]}});
     }
   }
-  const YamlCursor
-      on_surface = map.get(
-          "centreline_on_surface",
-          "Whether the centreline comes to lie on the floor, instead of one radius above. Without the key: false."),
-      friction = map.get("friction",
-                         "Coefficient of friction with which the thread slips on the floor; the thread needs "
-                         "`contact`. Without the key the thread sticks to the floor.");
-  assign(floor.on_surface, on_surface.boolean());
+  const YamlCursor on_surface =
+      map.get("centreline_on_surface", floor.on_surface,
+              "Whether the centreline comes to lie on the floor, instead of one radius above. Without the key: false.");
+  const YamlCursor friction = map.get("friction",
+                                      "Coefficient of friction with which the thread slips on the floor; the thread "
+                                      "needs `contact`. Without the key the thread sticks to the floor.");
   floor.friction = friction.number(Range::closed(0, 100, "[-]"));
   if (floor.friction && floor.on_surface)
     on_surface.problem("is for floors that the thread sticks to, without floor.friction");
@@ -179,24 +165,18 @@ FloorConfig readFloor(const YamlCursor& at)
 void readEdges(const YamlCursor& at, ThreadConfig& thread)
 {
   YamlMap map(at);
-  const YamlCursor
-      feed = map.get("feed",
-                     "Length of the edges that leave the nozzle. Without the key: from the flow, or one nozzle "
-                     "diameter where nothing is below."),
-      longest = map.get("longest",
-                        "Length from which an edge is divided. Without the key: from the flow, about twenty edges per "
-                        "turn of a coil; without a nozzle or anything below it, edges are not divided."),
-      shortest =
-          map.get("shortest",
-                  "Length below which an edge is joined to its neighbour; at most 0.4 of `longest`. Without the key: "
-                  "from the flow if `feed` and `longest` are not given either, otherwise edges are not joined.");
-  assign(thread.feed_length, feed.number(length));
-  assign(thread.longest_edge, longest.number(length));
-  assign(thread.shortest_edge, shortest.number(length));
-  assign(thread.most_deposited,
-         map.get("deposited",
-                 "Number of nodes that are kept on the floor; older ones are dropped. Without the key all are kept.")
-             .integer(4, 10'000'000, "nodes"));
+  const YamlCursor feed = map.get("feed", thread.feed_length, kLength,
+                                  "Length of the edges that leave the nozzle. Without the key: from the flow, or one "
+                                  "nozzle diameter where nothing is below.");
+  map.get("longest", thread.longest_edge, kLength,
+          "Length from which an edge is divided. Without the key: from the flow, about twenty edges per turn of a "
+          "coil; without a nozzle or anything below it, edges are not divided.");
+  const YamlCursor shortest =
+      map.get("shortest", thread.shortest_edge, kLength,
+              "Length below which an edge is joined to its neighbour; at most 0.4 of `longest`. Without the key: from "
+              "the flow if `feed` and `longest` are not given either, otherwise edges are not joined.");
+  map.get("deposited", thread.most_deposited, Range::closed(4, 10'000'000, "nodes"),
+          "Number of nodes that are kept on the floor; older ones are dropped. Without the key all are kept.");
   if (feed.present() && !thread.nozzle)
     feed.problem("is for threads with a nozzle");
   if (shortest.present() && thread.longest_edge > 0 && thread.shortest_edge > 0.4 * thread.longest_edge)
@@ -218,8 +198,8 @@ void readMerging(const YamlCursor& at, ThreadConfig& thread)
   {
     YamlMap map(at);
     thread.merging = half_discs;
-    assign(thread.merging, map.get("until", "Distance of the centrelines at which merging ends. Without the key: 0.6.")
-                               .number(Range::closed(0.05, 0.95, "of the sum of the radii")));
+    map.get("until", thread.merging, Range::closed(0.05, 0.95, "of the sum of the radii"),
+            "Distance of the centrelines at which merging ends. Without the key: 0.6.");
     map.finish();
   }
   else if (at.boolean().value_or(false))
@@ -240,21 +220,16 @@ void readThreadCurve(const YamlCursor& centerline, const YamlCursor& radius, con
     radius.problem("is missing");
   if (thread.centerline && !thread.radius.empty())
   {
-    try
-    {
+    radius.attempt([&] {
       perEdge(thread.radius, static_cast<int>(curveNodes(*thread.centerline, context.gravity).cols()) - 1, "radius");
-    }
-    catch (const std::invalid_argument& error)
-    {
-      radius.problem(error.what());
-    }
+    });
   }
   YamlMap held(ends);
   const char* names[2] = {"oldest", "newest"};
   const char* meanings[2] = {"Whether the oldest end is clamped where it is. Without the key: free.",
                              "Whether the newest end is clamped where it is. Without the key: free."};
   for (int end = 0; end < 2; ++end)
-    assign(thread.held[end], held.get(names[end], meanings[end]).choice<bool>({{"free", false}, {"held", true}}));
+    held.get(names[end], thread.held[end], {{"free", false}, {"held", true}}, meanings[end]);
   held.finish();
 }
 
@@ -263,8 +238,8 @@ void readRegion(const YamlCursor& region, ThreadConfig& thread)
   if (!region.present())
     return;
   YamlMap box(region);
-  const YamlCursor low = box.require("from", "Lower corner of the box."),
-                   high = box.require("to", "Upper corner of the box.");
+  const YamlCursor low = box.require("from", "Lower corner of the box.");
+  const YamlCursor high = box.require("to", "Upper corner of the box.");
   box.finish();
   const Range anywhere = Range::closed(-1e9, 1e9, "m");
   const auto a = low.vector3(anywhere), b = high.vector3(anywhere);
@@ -279,28 +254,27 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
   ThreadConfig thread;
   thread.name = default_name;
   YamlMap map(at);
-  assign(thread.name, map.get("name",
-                              "Name of the thread, which topics and tables use. Without the key: thread if there is "
-                              "one thread, otherwise thread0, thread1, ...")
-                          .name());
+  map.getName(thread.name,
+              "Name of the thread, which topics and tables use. Without the key: thread if there is one thread, "
+              "otherwise thread0, thread1, ...");
   YamlMap fluid(map.get("fluid", "The fluid. Without the key: the defaults of the keys in it, with a warning."));
-  assign(thread.density,
-         fluid.get("density", "Mass per volume. Without the key: 1000 kg/m^3.").number(Range::above(0, 1e6, "kg/m^3")));
-  assign(thread.viscosity,
-         fluid.get("viscosity", "Dynamic viscosity. Without the key: 1 Pa s.").number(Range::above(0, 1e12, "Pa s")));
-  assign(thread.surface_tension,
-         fluid.get("surface_tension", "Surface tension. Without the key: 0.").number(Range::closed(0, 1e3, "N/m")));
+  fluid.get("density", thread.density, Range::above(0, 1e6, "kg/m^3"),
+            "Mass per volume. Without the key: 1000 kg/m^3.");
+  fluid.get("viscosity", thread.viscosity, Range::above(0, 1e12, "Pa s"),
+            "Dynamic viscosity. Without the key: 1 Pa s.");
+  fluid.get("surface_tension", thread.surface_tension, Range::closed(0, 1e3, "N/m"),
+            "Surface tension. Without the key: 0.");
   fluid.finish();
 
   const YamlCursor nozzle =
-                       map.get("nozzle", "Nozzle out of which the thread flows. Give either `nozzle` or `centerline`."),
-                   centerline = map.get("centerline",
+      map.get("nozzle", "Nozzle out of which the thread flows. Give either `nozzle` or `centerline`.");
+  const YamlCursor centerline = map.get("centerline",
                                         "Shape of a thread that is there at the start, from its oldest end to its "
-                                        "newest. Give either `nozzle` or `centerline`."),
-                   radius = map.get("radius",
+                                        "newest. Give either `nozzle` or `centerline`.");
+  const YamlCursor radius = map.get("radius",
                                     "Radius of a thread with a `centerline`: one number, two for a taper from the "
-                                    "oldest end to the newest, or one per edge. It must be given there."),
-                   ends = map.get("ends", "Ends of a thread with a `centerline`. Without the key both are free.");
+                                    "oldest end to the newest, or one per edge. It must be given there.");
+  const YamlCursor ends = map.get("ends", "Ends of a thread with a `centerline`. Without the key both are free.");
   if (nozzle.present() == centerline.present())
   {
     at.problem("must have either a nozzle that it flows out of, or a centerline (with radius)");
@@ -330,19 +304,16 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
               thread);
   if (thread.floor && thread.floor->friction && !(thread.contact && thread.contact->solids))
   {
-    YamlMap(floor)
-        .find("friction")
+    floor.find("friction")
         .problem(
             "makes the floor an obstacle, which this thread does not touch; give it contact: {obstacles: true}, or "
             "leave friction out, then it sticks");
   }
   readEdges(map.get("edges", "Lengths of the edges. Without the key they are chosen from the flow."), thread);
-  assign(thread.breakup_radius,
-         map.get("breakup_radius",
-                 "Radius below which the thread parts; 0: it never parts. Without the key: 0.05 of the smallest radius "
-                 "that is expected from the flow (of the nozzle's radius if that is smaller); 0.01 of the nozzle's "
-                 "diameter if nothing is below it; 0 without a nozzle.")
-             .number(Range::closed(0, kMaxCoordinate, "m")));
+  map.get("breakup_radius", thread.breakup_radius, Range::closed(0, kMaxCoordinate, "m"),
+          "Radius below which the thread parts; 0: it never parts. Without the key: 0.05 of the smallest radius that "
+          "is expected from the flow (of the nozzle's radius if that is smaller); 0.01 of the nozzle's diameter if "
+          "nothing is below it; 0 without a nozzle.");
   const YamlCursor region = map.get("region",
                                     "Box in which fluid is kept: what lies outside is dropped, the oldest first. "
                                     "Without the key everything is kept.");
@@ -355,19 +326,12 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
 
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context)
 {
-  std::vector<ThreadConfig> threads;
-  if (!at.present())
-    return threads;
-  std::map<std::string, std::string> names;   // to the path that used it first
-  const auto entries = at.items(1, 10'000);
-  for (std::size_t k = 0; k < entries.size(); ++k)
-  {
-    threads.push_back(readThread(entries[k], context, entries.size() == 1 ? "thread" : "thread" + std::to_string(k)));
-    const auto [other, is_new] = names.emplace(threads.back().name, entries[k].path());
-    if (!is_new)
-      YamlMap(entries[k]).find("name").problem("is also the name of " + other->second + "; names must differ");
-  }
-  return threads;
+  std::map<std::string, std::string> names;
+  return readEach<ThreadConfig>(at, 1, 10'000, "thread", [&](const YamlCursor& entry, const std::string& default_name) {
+    ThreadConfig thread = readThread(entry, context, default_name);
+    takeName(names, entry, thread.name);
+    return thread;
+  });
 }
 
 }   // namespace slender

@@ -9,32 +9,27 @@ TimeConfig readTime(const YamlCursor& at)
 {
   TimeConfig time;
   YamlMap map(at);
-  assign(time.step,
-         map.get("step", "Length of a time step. Without the key: 0.005 s.").number(Range::above(0, 10, "s")));
-  assign(time.duration,
-         map.get("duration", "Simulated time after which `simulate` ends; nodes run on. Without the key: 10 s.")
-             .number(Range::above(0, 1e7, "s")));
-  assign(time.integrator,
-         map.get("integrator",
-                 "Method by which time steps are taken. Without the key: tr_bdf2; implicit_euler in scenes with cloth, "
-                 "with contact of rods or bodies, and with rods that have `track`. Threads always take implicit_euler; "
-                 "imex is for cloth alone, and symplectic_euler takes explicit steps.")
-             .choice<Integrator>({{"implicit_euler", Integrator::implicit_euler},
-                                  {"bdf2", Integrator::bdf2},
-                                  {"tr_bdf2", Integrator::tr_bdf2},
-                                  {"implicit_midpoint", Integrator::implicit_midpoint},
-                                  {"generalized_alpha", Integrator::generalized_alpha},
-                                  {"symplectic_euler", Integrator::symplectic_euler},
-                                  {"imex", Integrator::imex}}));
-  assign(time.spectral_radius, map.get("spectral_radius",
-                                       "Numerical damping of generalized_alpha: the factor by which one step changes "
-                                       "the fastest vibrations. 1 damps nothing, 0 damps most. Without the key: 0.8.")
-                                   .number(Range::closed(0, 1)));
+  map.get("step", time.step, Range::above(0, 10, "s"), "Length of a time step. Without the key: 0.005 s.");
+  map.get("duration", time.duration, Range::above(0, 1e7, "s"),
+          "Simulated time after which `simulate` ends; nodes run on. Without the key: 10 s.");
+  map.get("integrator", time.integrator,
+          {{"implicit_euler", Integrator::implicit_euler},
+           {"bdf2", Integrator::bdf2},
+           {"tr_bdf2", Integrator::tr_bdf2},
+           {"implicit_midpoint", Integrator::implicit_midpoint},
+           {"generalized_alpha", Integrator::generalized_alpha},
+           {"symplectic_euler", Integrator::symplectic_euler},
+           {"imex", Integrator::imex}},
+          "Method by which time steps are taken. Without the key: tr_bdf2; implicit_euler in scenes with cloth, with "
+          "contact of rods or bodies, and with rods that have `track`. Threads always take implicit_euler; imex is for "
+          "cloth alone, and symplectic_euler takes explicit steps.");
+  map.get("spectral_radius", time.spectral_radius, Range::closed(0, 1),
+          "Numerical damping of generalized_alpha: the factor by which one step changes the fastest vibrations. 1 "
+          "damps nothing, 0 damps most. Without the key: 0.8.");
   const YamlCursor error_tolerance =
-      map.get("error_tolerance",
+      map.get("error_tolerance", time.error_tolerance, Range::closed(0, 1, "m"),
               "Largest error of a position that one step may make; `time.step` is then the longest step, and shorter "
               "ones are taken where they are needed. Without the key, or with 0, steps have a fixed length.");
-  assign(time.error_tolerance, error_tolerance.number(Range::closed(0, 1, "m")));
   if (time.error_tolerance > 0 && isExplicit(time.integrator))
     error_tolerance.problem("is for implicit integrators; steps of symplectic_euler and imex are of fixed length");
   const YamlCursor min_step = map.get("min_step",
@@ -48,27 +43,19 @@ TimeConfig readTime(const YamlCursor& at)
   }
   time.min_step = std::min(time.min_step, time.step);
   YamlMap newton(map.get("newton", "Settings of the solver of implicit steps (Newton's method)."));
-  assign(time.newton.tolerance, newton
-                                    .get("tolerance",
-                                         "A step is solved when the last change of the positions is smaller than this "
-                                         "fraction of the shortest edge. Without the key: 1e-6.")
-                                    .number(Range::between(1e-14, 1e-1)));
-  assign(time.newton.max_iterations,
-         newton
-             .get("max_iterations",
-                  "Number of Newton iterations after which a step counts as failed. Without the key: 30.")
-             .integer(1, 1000));
-  assign(time.newton.max_cuts,
-         newton.get("max_cuts", "How often a step that fails is halved before it is refused. Without the key: 10.")
-             .integer(0, 30));
-  assign(time.island_solver,
-         newton
-             .get("linear",
-                  "Solver of the linear equations of rods, threads and bodies that touch or are joined. Without the "
-                  "key, or with auto, it is chosen by the number of parts and of contacts.")
-             .choice<IslandSolver>({{"auto", IslandSolver::automatic},
-                                    {"cholesky", IslandSolver::cholesky},
-                                    {"conjugate_gradients", IslandSolver::conjugate_gradients}}));
+  newton.get("tolerance", time.newton.tolerance, Range::between(1e-14, 1e-1),
+             "A step is solved when the last change of the positions is smaller than this fraction of the shortest "
+             "edge. Without the key: 1e-6.");
+  newton.get("max_iterations", time.newton.max_iterations, Range::closed(1, 1000),
+             "Number of Newton iterations after which a step counts as failed. Without the key: 30.");
+  newton.get("max_cuts", time.newton.max_cuts, Range::closed(0, 30),
+             "How often a step that fails is halved before it is refused. Without the key: 10.");
+  newton.get("linear", time.island_solver,
+             {{"auto", IslandSolver::automatic},
+              {"cholesky", IslandSolver::cholesky},
+              {"conjugate_gradients", IslandSolver::conjugate_gradients}},
+             "Solver of the linear equations of rods, threads and bodies that touch or are joined. Without the key, or "
+             "with auto, it is chosen by the number of parts and of contacts.");
   newton.finish();
   map.finish();
   return time;

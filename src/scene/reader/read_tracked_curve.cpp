@@ -36,25 +36,13 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& points, const YamlCurs
   std::vector<Eigen::Vector3d> out;
   if (const auto path = file.present() ? file.text() : std::nullopt)
   {
-    try
-    {
+    file.attempt([&] {
       out = readPointFile(context.resolve(*path));
       for (const Eigen::Vector3d& point : out)
-      {
-        if (!(point.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-        {
-          file.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
-          return {};
-        }
-      }
-    }
-    catch (const SceneError& error)
-    {
-      file.problem(error.what());
-      return {};
-    }
+        requireCoordinates(point);
+    });
   }
-  for (const YamlCursor& item : points.present() ? points.items() : std::vector<YamlCursor>{})
+  for (const YamlCursor& item : points.items())
     if (const auto point = item.vector3(kCoordinate))
       out.push_back(*point);
   return out;
@@ -66,11 +54,10 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
 {
   const YamlCursor nodes = map.get("nodes",
                                    "Number of nodes of the guide: as many nodes of the rod where it starts, evenly "
-                                   "spaced. Give one of `nodes`, `points` and `file`."),
-                   points =
-                       map.get("points",
-                               "Nodes of the guide. They lie along the rod by their shares of the polyline's length."),
-                   file = map.get("file", "CSV file with a node x,y,z of the guide per line.");
+                                   "spaced. Give one of `nodes`, `points` and `file`.");
+  const YamlCursor points =
+      map.get("points", "Nodes of the guide. They lie along the rod by their shares of the polyline's length.");
+  const YamlCursor file = map.get("file", "CSV file with a node x,y,z of the guide per line.");
   GuideNodes guide;
   const int fewest = rod.closed ? 3 : 2;
   nodes.takes("a whole number, from 2 (of a closed rod 3) to the number of the rod's nodes");
@@ -110,9 +97,8 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
                  " needs at least " + std::to_string(fewest));
     return guide;
   }
-  Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(given.size()));
-  for (std::size_t k = 0; k < given.size(); ++k)
-    matrix.col(static_cast<Eigen::Index>(k)) = given[k];
+  Eigen::Matrix3Xd matrix =
+      Eigen::Map<const Eigen::Matrix3Xd>(given[0].data(), 3, static_cast<Eigen::Index>(given.size()));
   const Eigen::VectorXd lengths = edgeLengths(matrix, rod.closed);
   Eigen::Index shortest = 0;
   if (!(lengths.minCoeff(&shortest) > 1e-9 * lengths.sum()))
@@ -137,19 +123,12 @@ std::optional<PointTrajectory> readTable(const YamlCursor& at, int nodes)
       return std::nullopt;
     if (row->size() != 1 + 3 * static_cast<std::size_t>(nodes))
     {
-      item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x0, y0, z0, x1, ...] of the guide's " +
-                   std::to_string(nodes) + " nodes");
+      return item.problem("has " + std::to_string(row->size()) +
+                          " numbers; must be [t, x0, y0, z0, x1, ...] of the guide's " + std::to_string(nodes) +
+                          " nodes");
+    }
+    if (!item.attempt([&] { appendPoints(points, *row); }))
       return std::nullopt;
-    }
-    try
-    {
-      appendPoints(points, *row);
-    }
-    catch (const std::invalid_argument& error)
-    {
-      item.problem(error.what());
-      return std::nullopt;
-    }
   }
   return points.empty() ? std::nullopt : std::optional<PointTrajectory>(std::move(points));
 }
@@ -159,24 +138,13 @@ std::optional<PointTrajectory> readMotionFile(const YamlCursor& at, const ReadCo
   const auto path = at.text();
   if (!path)
     return std::nullopt;
-  try
-  {
-    PointTrajectory points = readPointMotion(context.resolve(*path), nodes);
+  PointTrajectory points;
+  const bool good = at.attempt([&] {
+    points = readPointMotion(context.resolve(*path), nodes);
     for (const Eigen::Matrix3Xd& frame : points.frames())
-    {
-      if (!(frame.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-      {
-        at.problem("has coordinates beyond " + shortNumber(kMaxCoordinate) + " m");
-        return std::nullopt;
-      }
-    }
-    return points;
-  }
-  catch (const SceneError& error)
-  {
-    at.problem(error.what());
-    return std::nullopt;
-  }
+      requireCoordinates(frame);
+  });
+  return good ? std::make_optional(std::move(points)) : std::nullopt;
 }
 
 void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConfig& guide)
@@ -190,19 +158,17 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
   }
   const std::size_t before = at.problems().size();
   YamlMap map(at);
-  const YamlCursor table = map.get(
-                       "table",
-                       "Motion of all nodes of the guide: rows [t, x0, y0, z0, x1, ...], interpolated smoothly."),
-                   file = map.get("file", "CSV file with the motion of all nodes of the guide: rows t,x0,y0,z0,x1,..."),
-                   topic = map.get("topic", "The guide comes by messages on `guide/points`, nodes in order."),
-                   late = map.get("late",
+  const YamlCursor table =
+      map.get("table", "Motion of all nodes of the guide: rows [t, x0, y0, z0, x1, ...], interpolated smoothly.");
+  const YamlCursor file = map.get("file", "CSV file with the motion of all nodes of the guide: rows t,x0,y0,z0,x1,...");
+  const YamlCursor topic = map.get("topic", "The guide comes by messages on `guide/points`, nodes in order.");
+  const YamlCursor late = map.get("late",
                                   "What the guide does when no message comes: hold the last one, or go on at the last "
-                                  "speed, which dies out. Without the key: hold."),
-                   tf = map.get("tf", "Name of a frame of tf that carries the whole guide; a node looks it up."),
-                   offset = map.get("offset",
-                                    "With `tf`: pose of the guide in the frame. Without the key, the guide is carried "
-                                    "as `attach` says."),
-                   attach = map.get("attach",
+                                  "speed, which dies out. Without the key: hold.");
+  const YamlCursor tf = map.get("tf", "Name of a frame of tf that carries the whole guide; a node looks it up.");
+  const YamlCursor offset = map.get(
+      "offset", "With `tf`: pose of the guide in the frame. Without the key, the guide is carried as `attach` says.");
+  const YamlCursor attach = map.get("attach",
                                     "With `tf`. `initial`: the frame carries the guide from where both are at first. "
                                     "`frame`: the guide is given in the frame. Without the key: initial.");
   map.finish();
@@ -248,9 +214,9 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
   if (!at.present())
     return curveHats(weights);
   YamlMap map(at);
-  const YamlCursor basis = map.get("basis", "The guide's hat functions: one average per node of the guide."),
-                   segments =
-                       map.get("segments", "Number of equal parts of the rod's length whose averages are prescribed.");
+  const YamlCursor basis = map.get("basis", "The guide's hat functions: one average per node of the guide.");
+  const YamlCursor segments =
+      map.get("segments", "Number of equal parts of the rod's length whose averages are prescribed.");
   segments.takes("a whole number, from 1 to the number of the rod's nodes");
   map.finish();
   if (basis.present() == segments.present())
@@ -264,13 +230,6 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
   const auto count =
       segments.integer(1, rod.rest.cols() > 0 ? static_cast<long>(rod.rest.cols()) : max_edges + 1, "segments");
   return count && rod.rest.cols() > 0 ? curveSegments(*count, rod.shares, rod.closed) : TestFunctions{};
-}
-
-/// Reports what the rod has that does not go with a guide.
-void checkTraits(const YamlCursor& at, const RodConfig& rod)
-{
-  if (rod.stretching == Stretching::projected)
-    at.problem("takes implicit steps; with it stretching must be stiff");
 }
 
 }   // namespace
@@ -311,7 +270,8 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
                                           "Without the key: the guide's hat functions.");
   set.functions = readCurveFunctions(at_functions, rod, weights);
   map.finish();
-  checkTraits(at, config);
+  if (config.stretching == Stretching::projected)
+    at.problem("takes implicit steps; with it stretching must be stiff");
   if (set.functions.count() > most_functions ||
       12.0 * set.functions.count() * static_cast<double>(rod.rest.cols()) > kMaxGuideNumbers)
   {
@@ -321,8 +281,7 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
   }
   if (!good || at.problems().size() != before)
     return nullptr;
-  try
-  {
+  const bool independent = (at_functions.present() ? at_functions : at).attempt([&] {
     auto constraints =
         std::make_shared<WeakConstraints>(curveConstraints(set.functions, weights, rod.rest, rod.closed));
     std::vector<char> held;
@@ -335,12 +294,9 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
     }
     constraints->requireIndependent(held);
     set.constraints = std::move(constraints);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    (at_functions.present() ? at_functions : at).problem(error.what());
+  });
+  if (!independent)
     return nullptr;
-  }
   tracking->sets.push_back(std::move(set));
   tracking->size = edgeLengths(rod.rest, rod.closed).sum();
   return tracking;

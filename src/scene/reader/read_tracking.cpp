@@ -79,20 +79,11 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
     tracked.subdivision = subdivide(coarse, levels);
     tracked.good = true;
   }
-  try
-  {
-    if (tracked.good)
-    {
-      requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path
-                                                 : guide.file ? guide.file->path
-                                                              : "undeformed");
-    }
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at.problem(error.what());
-    tracked.good = false;
-  }
+  tracked.good = tracked.good && at.attempt([&] {
+    requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path
+                                               : guide.file ? guide.file->path
+                                                            : "undeformed");
+  });
   return tracked;
 }
 
@@ -125,17 +116,15 @@ TestFunctions readClusters(const YamlCursor& at, const GuideConfig& guide)
 {
   ClusteringOptions options;
   YamlMap map(at);
-  assign(options.regions, map.require("count", "Number of regions.").integer(1, 1'000'000, "regions"));
-  assign(
-      options.compactness,
-      map.get("compactness", "1: compact regions, 0: flat regions. Without the key: 0.5.").number(Range::closed(0, 1)));
+  map.require("count", options.regions, Range::closed(1, 1'000'000, "regions"), "Number of regions.");
+  map.get("compactness", options.compactness, Range::closed(0, 1),
+          "1: compact regions, 0: flat regions. Without the key: 0.5.");
   int seed = 1;
-  assign(seed,
-         map.get("seed", "Seed of the random start of the clustering. Without the key: 1.").integer(0, 2'000'000'000));
+  map.get("seed", seed, Range::closed(0, 2'000'000'000),
+          "Seed of the random start of the clustering. Without the key: 1.");
   options.seed = static_cast<unsigned>(seed);
-  assign(options.sampled_frames,
-         map.get("frames", "Number of frames of the guide's motion that the regions suit. Without the key: 20.")
-             .integer(1, 10'000));
+  map.get("frames", options.sampled_frames, Range::closed(1, 10'000),
+          "Number of frames of the guide's motion that the regions suit. Without the key: 20.");
   map.finish();
   const auto* carried = std::get_if<CarriedGuide>(&guide.motion);
   const bool live = std::holds_alternative<TopicGuide>(guide.motion) || (carried && carried->poses.empty());
@@ -174,8 +163,7 @@ std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& 
                                  static_cast<int>(guide.config.mesh.vertices.cols()));
     const char* const meaning =
         "Vertices of the tracked mesh in the region. Needed if that mesh comes from a file; otherwise the guide's "
-        "function "
-        "is prolonged to it.";
+        "function is prolonged to it.";
     const YamlCursor own =
         tracked.kind == TrackedMesh::separate ? map.require("tracked", meaning) : map.get("tracked", meaning);
     if (own.present())
@@ -192,31 +180,27 @@ TestFunctions readFunctions(const YamlCursor& at, const ReadContext& context, co
                             const TrackedMesh& tracked, FunctionSet* named)
 {
   YamlMap map(at);
-  const YamlCursor
-      basis = map.get("basis", "One average per vertex of the guide, by the hat functions of its subdivision."),
-      vertices =
-          map.get("vertices", "Vertices of the guide that count for `basis: subdivision`. Without the key: all."),
-      regions = map.get(
-          "regions",
-          "One average per region: those of the groups in the guide's OBJ file, or a map from names to vertices."),
-      clusters =
-          map.get("clusters", "One average per region, found by clustering the guide's faces; for `mesh: same`.");
+  const YamlCursor basis =
+      map.get("basis", "One average per vertex of the guide, by the hat functions of its subdivision.");
+  const YamlCursor vertices =
+      map.get("vertices", "Vertices of the guide that count for `basis: subdivision`. Without the key: all.");
+  const YamlCursor regions =
+      map.get("regions",
+              "One average per region: those of the groups in the guide's OBJ file, or a map from names to vertices.");
+  const YamlCursor clusters =
+      map.get("clusters", "One average per region, found by clustering the guide's faces; for `mesh: same`.");
   if (named)
   {
     assign(named->name,
            map.require("name",
                        "Name of a set of test functions; for entries of a list of sets, of which one acts at a time.")
                .name());
-    if (const auto from =
-            map.get("from",
-                    "Simulated time at which the set takes over; for entries of a list of sets. Without the key only "
-                    "the service `~set_functions` calls for it; the first set acts from the start.")
-                .number(Range::above(0, 1e7, "s")))
-      named->from = *from;
-    assign(named->blend, map.get("blend",
-                                 "Time within which the averages go over to the guide's when the set takes over; 0: in "
-                                 "one step. For entries of a list of sets. Without the key: 0.2 s.")
-                             .number(Range::closed(0, 1e7, "s")));
+    map.get("from", named->from, Range::above(0, 1e7, "s"),
+            "Simulated time at which the set takes over; for entries of a list of sets. Without the key only "
+            "the service `~set_functions` calls for it; the first set acts from the start.");
+    map.get("blend", named->blend, Range::closed(0, 1e7, "s"),
+            "Time within which the averages go over to the guide's when the set takes over; 0: in one step. For "
+            "entries of a list of sets. Without the key: 0.2 s.");
   }
   map.finish();
   if (basis.present() + regions.present() + clusters.present() > 1)
@@ -312,11 +296,10 @@ FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<
 {
   FunctionSet set;
   set.blend = named ? default_blend : 0.0;
-  try
-  {
+  at.attempt([&] {
     set.functions = readFunctions(at, context, guide, tracked, named ? &set : nullptr);
     if (set.functions.count() == 0)
-      return set;   // reported
+      return;   // reported
     // of the mesh as it lies on its guide, whatever its lengths at rest are
     auto constraints = std::make_shared<WeakConstraints>(set.functions, hatMassMatrix(guide.config.mesh),
                                                          hatMassMatrix(tracked.subdivision.mesh));
@@ -330,11 +313,7 @@ FunctionSet readFunctionSet(const YamlCursor& at, bool named, const std::vector<
     constraints->requireIndependent(held);
     set.bounds = boundsOf(tractions, *constraints, used);
     set.constraints = std::move(constraints);
-  }
-  catch (const std::invalid_argument& error)
-  {
-    at.problem(error.what());
-  }
+  });
   return set;
 }
 
@@ -356,9 +335,9 @@ std::shared_ptr<const TrackingConfig> readTracking(const YamlCursor& at, const s
     for (const FunctionSet& other : tracking->sets)
     {
       if (!set.name.empty() && other.name == set.name)
-        YamlMap(entry).find("name").problem("is also the name of another set; names must differ");
+        entry.find("name").problem("is also the name of another set; names must differ");
       if (set.from && other.from == set.from)
-        YamlMap(entry).find("from").problem("is also when set " + other.name + " takes over; times must differ");
+        entry.find("from").problem("is also when set " + other.name + " takes over; times must differ");
     }
     tracking->sets.push_back(set);
   }
@@ -377,10 +356,9 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
   cloth.name = default_name;
   cloth.place = at.place();
   YamlMap map(at);
-  assign(cloth.name, map.get("name",
-                             "Name of the cloth, which topics, tables and other keys use. Without the key: tracked if "
-                             "there is one, otherwise tracked0, tracked1, ...")
-                         .name());
+  map.getName(cloth.name,
+              "Name of the cloth, which topics, tables and other keys use. Without the key: tracked if there is one, "
+              "otherwise tracked0, tracked1, ...");
   const YamlCursor at_functions =
       map.get("test_functions",
               "Averages of the cloth that are prescribed: a map, or a list of maps with names that take over from each "
@@ -421,20 +399,16 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
 
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths)
 {
-  if (!at.present())
-    return;
   std::map<std::string, std::string> names;   // to what has it
   for (const ClothConfig& cloth : cloths)
     names.emplace(cloth.name, "a cloth");
-  const auto entries = at.items(1, 1000);
-  for (std::size_t k = 0; k < entries.size(); ++k)
-  {
-    cloths.push_back(
-        readTrackedCloth(entries[k], context, cloths, entries.size() == 1 ? "tracked" : "tracked" + std::to_string(k)));
-    const auto [other, is_new] = names.emplace(cloths.back().name, entries[k].path());
-    if (!is_new)
-      YamlMap(entries[k]).find("name").problem("is also the name of " + other->second + "; names must differ");
-  }
+  auto tracked =
+      readEach<ClothConfig>(at, 1, 1000, "tracked", [&](const YamlCursor& entry, const std::string& default_name) {
+        ClothConfig cloth = readTrackedCloth(entry, context, cloths, default_name);
+        takeName(names, entry, cloth.name);
+        return cloth;
+      });
+  std::move(tracked.begin(), tracked.end(), std::back_inserter(cloths));
 }
 
 }   // namespace slender

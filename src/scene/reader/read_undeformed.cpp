@@ -3,7 +3,6 @@
 
 #include "read_cloth_mesh.h"
 #include "slender_sim/geometry/mesh_offsets.h"
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -19,8 +18,8 @@ bool foldsFit(const YamlCursor& at, const YamlCursor& at_along, const Eigen::Vec
   if (length < 0.25 * wavelength)
   {
     at_along.problem("the cloth is " + shortNumber(length) +
-                     " m long along it, less than a quarter of a wavelength, and gets no folds; "
-                     "take a direction within the cloth, or a shorter wavelength");
+                     " m long along it, less than a quarter of a wavelength, and gets no folds; take a direction "
+                     "within the cloth, or a shorter wavelength");
     return false;
   }
   if (wavelength < fewest_edges * edge)
@@ -58,20 +57,19 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
   {
     at.problem(
         "must have one of {file: PATH}, {folds: {along: [...], wavelength: L, height: H}}, {ridges: {axis: [...], "
-        "count: N, height: H}}, "
-        "{crinkles: {height: H}}");
+        "count: N, height: H}}, {crinkles: {height: H}}");
     return {};
   }
   YamlMap shape(folds.present() ? folds : ridges.present() ? ridges : crinkles);
-  const auto height = shape.require("height", "Height of the offsets from the mesh, along its normals.")
-                          .number(Range::above(0, 10, "m"));
+  std::optional<double> height;
+  shape.require("height", height, Range::above(0, 10, "m"), "Height of the offsets from the mesh, along its normals.");
   Eigen::Vector3d direction(0, 0, 1);
   const std::size_t before = at.problems().size();
   double wavelength = 1.0;
   int count = 1, seed = 1;
   if (crinkles.present())
   {
-    assign(seed, shape.get("seed", "Seed of the random offsets. Without the key: 1.").integer(0, 2'000'000'000));
+    shape.get("seed", seed, Range::closed(0, 2'000'000'000), "Seed of the random offsets. Without the key: 1.");
   }
   else
   {
@@ -115,13 +113,12 @@ void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfi
     return;
   }
   bool lengths = false;
-  const YamlCursor folds = map.get("folds", "Folds like those of an accordion."),
-                   ridges = map.get("ridges", "Ridges about an axis."),
-                   crinkles = map.get("crinkles", "Random offsets of the vertices.");
-  assign(lengths, map.get("lengths",
-                          "Whether lengths at rest are also those of the offset shape; the cloth still starts as its "
-                          "mesh. Without the key: false, lengths at rest are those of the mesh.")
-                      .boolean());
+  const YamlCursor folds = map.get("folds", "Folds like those of an accordion.");
+  const YamlCursor ridges = map.get("ridges", "Ridges about an axis.");
+  const YamlCursor crinkles = map.get("crinkles", "Random offsets of the vertices.");
+  map.get("lengths", lengths,
+          "Whether lengths at rest are also those of the offset shape; the cloth still starts as its mesh. Without the "
+          "key: false, lengths at rest are those of the mesh.");
   map.finish();
   const Eigen::Matrix3Xd shape = readOffsets(at, folds, ridges, crinkles, cloth.mesh);
   if (shape.cols() == 0 || !lengths)

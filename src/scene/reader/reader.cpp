@@ -11,7 +11,6 @@
 #include "read_parts.h"
 #include "reader_log.h"
 #include "scene_tree.h"
-#include "solid_names.h"
 #include "cloth/cloth_part.h"
 
 namespace slender {
@@ -22,30 +21,24 @@ constexpr std::uintmax_t max_file_size = 256u << 20;   // [bytes]
 
 std::vector<ReadRod> readRods(const YamlCursor& at, const ReadContext& context)
 {
-  std::vector<ReadRod> rods;
-  std::map<std::string, std::string> rod_names, grasp_names;   // to the path that used it first
-  const auto entries = at.items(1, 100'000);
-  for (std::size_t k = 0; k < entries.size(); ++k)
-  {
-    const YamlCursor& entry = entries[k];
-    rods.push_back(readRod(entry, context, entries.size() == 1 ? "rod" : "rod" + std::to_string(k)));
-    rods.back().config.place = entry.place();
-    const auto [rod, new_rod] = rod_names.emplace(rods.back().config.name, entry.path());
-    if (!new_rod)
-      YamlMap(entry).find("name").problem("is also the name of " + rod->second + "; names must differ");
-    for (const GraspConfig& grasp : rods.back().config.grasps)
+  std::map<std::string, std::string> names, grasp_names;   // to the path that used it first
+  return readEach<ReadRod>(at, 1, 100'000, "rod", [&](const YamlCursor& entry, const std::string& default_name) {
+    ReadRod rod = readRod(entry, context, default_name);
+    rod.config.place = entry.place();
+    takeName(names, entry, rod.config.name);
+    for (const GraspConfig& grasp : rod.config.grasps)
     {
       const std::string path = entry.path() + ".grasps." + grasp.name;
       const auto [other, new_grasp] = grasp_names.emplace(grasp.name, path);
       if (!new_grasp)
       {
-        YamlMap(YamlMap(entry).find("grasps"))
+        entry.find("grasps")
             .find(grasp.name)
             .problem("has the same name as " + other->second + "; grasps of a scene need different names");
       }
     }
-  }
-  return rods;
+    return rod;
+  });
 }
 
 /// Adds what the generators made; names must differ from those of the file.
@@ -78,8 +71,22 @@ void takeGeneratedRods(Generated& generated, std::vector<ReadRod>& rods)
   }
 }
 
+/// The grasps of all rods and cloths that the lists of the scene have.
+std::vector<ListedGrasp> listedGrasps(const SceneConfig& scene, const std::vector<YamlCursor>& rods,
+                                      const std::vector<YamlCursor>& cloths)
+{
+  std::vector<ListedGrasp> all;
+  for (std::size_t r = 0; r < rods.size(); ++r)
+    for (const GraspConfig& grasp : scene.rods[r].grasps)
+      all.push_back({grasp, rods[r].find("grasps").find(grasp.name), false});
+  for (std::size_t k = 0; k < cloths.size(); ++k)
+    for (const GraspConfig& grasp : scene.cloths[k].grasps)
+      all.push_back({grasp, cloths[k].find("grasps").find(grasp.name), true});
+  return all;
+}
+
 /// A grasp cannot follow what it may hold back. Bodies that the scene does not have may be known to a node.
-void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods, const std::vector<YamlCursor>& cloths)
+void checkFollowed(const SceneConfig& scene, const std::vector<ListedGrasp>& grasps)
 {
   std::set<std::string> simulated;
   std::vector<std::string> names;
@@ -91,29 +98,22 @@ void checkFollowed(const SceneConfig& scene, const std::vector<YamlCursor>& rods
   }
   for (const ObstacleConfig& obstacle : scene.obstacles)
     names.push_back(obstacle.name);
-  const auto check = [&](const std::vector<GraspConfig>& grasps, const YamlCursor& entry, const char* instead) {
-    for (const GraspConfig& grasp : grasps)
+  for (const ListedGrasp& grasp : grasps)
+  {
+    const auto* motion = std::get_if<BodyMotion>(&grasp.config.motion);
+    if (motion && simulated.count(motion->body))
     {
-      const auto* motion = std::get_if<BodyMotion>(&grasp.motion);
-      const bool known = !motion || std::find(names.begin(), names.end(), motion->body) != names.end();
-      const auto at = [&] { return YamlMap(YamlMap(YamlMap(entry).find("grasps")).find(grasp.name)).find("motion"); };
-      if (motion && simulated.count(motion->body))
-      {
-        at().problem("body " + motion->body + " is simulated; " + instead);
-      }
-      else if (!known)
-      {
-        const std::string nearest = nearestWord(motion->body, names);
-        at().warning("the scene has no body or obstacle of this name" +
-                     (nearest.empty() ? std::string() : " (did you mean " + nearest + "?)") +
-                     ": the grasp stays where it is, unless a node hears of the body in its bodies topic");
-      }
+      grasp.at.find("motion").problem("body " + motion->body + " is simulated; " +
+                                      (grasp.of_cloth ? "cloth follows obstacles and driven bodies only"
+                                                      : "weld the rod to it instead (bodies: welds)"));
     }
-  };
-  for (std::size_t r = 0; r < rods.size(); ++r)
-    check(scene.rods[r].grasps, rods[r], "weld the rod to it instead (bodies: welds)");
-  for (std::size_t k = 0; k < cloths.size(); ++k)
-    check(scene.cloths[k].grasps, cloths[k], "cloth follows obstacles and driven bodies only");
+    else if (motion && std::find(names.begin(), names.end(), motion->body) == names.end())
+    {
+      grasp.at.find("motion").warning(
+          "the scene has no body or obstacle of this name" + didYouMean(motion->body, names) +
+          ": the grasp stays where it is, unless a node hears of the body in its bodies topic");
+    }
+  }
 }
 
 /// Returns why the contact of a cloth cannot be the barrier; empty: it can.
@@ -128,10 +128,12 @@ std::string whyNoBarrier(const SceneConfig& scene, std::size_t k)
   const auto& tracking = scene.cloths[k].tracking;
   if (!tracking)
     return "";
-  if (tracking->sets[0].bounds.size() > 0)
+  // sets that could not be read have no constraints, and a list of them may be empty
+  const std::vector<FunctionSet>& sets = tracking->sets;
+  if (std::any_of(sets.begin(), sets.end(), [](const FunctionSet& set) { return set.bounds.size() > 0; }))
     return "has a max_traction";
-  const bool many = std::any_of(tracking->sets.begin(), tracking->sets.end(), [](const FunctionSet& set) {
-    return set.constraints->count() > ClothPart::kMostAverages;
+  const bool many = std::any_of(sets.begin(), sets.end(), [](const FunctionSet& set) {
+    return set.constraints && set.constraints->count() > ClothPart::kMostAverages;
   });
   return many ? "has more than " + std::to_string(ClothPart::kMostAverages) + " test functions" : "";
 }
@@ -140,7 +142,7 @@ std::string whyNoBarrier(const SceneConfig& scene, std::size_t k)
 /// than cloth and what moves as prescribed.
 void chooseContactMethods(const std::vector<YamlCursor>& cloths, const std::vector<ReadRod>& rods, SceneConfig& scene)
 {
-  const auto method = [&](std::size_t k) { return YamlMap(YamlMap(cloths[k]).find("contact")).find("method"); };
+  const auto method = [&](std::size_t k) { return cloths[k].find("contact").find("method"); };
   bool others =
       std::any_of(rods.begin(), rods.end(), [](const ReadRod& rod) { return rod.config.contact.has_value(); });
   for (const ThreadConfig& thread : scene.threads)
@@ -175,11 +177,10 @@ void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cl
     const std::optional<ContactProperties>& contact = scene.cloths[k].contact;
     if (contact && contact->solids && contact->method == ContactMethod::impulses)
     {
-      YamlMap(cloths[k]).find("contact").problem(
+      cloths[k].find("contact").problem(
           "body " + body->name +
-          " is simulated, and contact by impulses does not push bodies; give the "
-          "body a motion or contact: false, or the "
-          "cloth contact: {obstacles: false}" +
+          " is simulated, and contact by impulses does not push bodies; give the body a motion or contact: false, or "
+          "the cloth contact: {obstacles: false}" +
           (whyNoBarrier(scene, k).empty() ? " or contact: {method: barrier}" : ""));
     }
   }
@@ -199,7 +200,8 @@ void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cl
       const auto [other, is_new] = owners.emplace(grasp.name, scene.cloths[k].name);
       if (!is_new)
       {
-        YamlMap(YamlMap(cloths[k]).find("grasps"))
+        cloths[k]
+            .find("grasps")
             .find(grasp.name)
             .problem("has the same name as a grasp of " + other->second + "; grasps of a scene need different names");
       }
@@ -234,7 +236,7 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
         "is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}], generate: [{...}] "
         "or bodies: [{...}]");
   }
-  std::vector<ReadRod> rods = at_rods.present() ? readRods(at_rods, context) : std::vector<ReadRod>{};
+  std::vector<ReadRod> rods = readRods(at_rods, context);
   Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
   takeGeneratedRods(generated, rods);
   scene.threads = readThreads(at_threads, context);
@@ -247,21 +249,28 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   for (const YamlCursor& entry : entriesOf(at_tracked))
     cloths.push_back(entry);
 
-  SolidNames names;
+  std::map<std::string, std::string> solids;   // to the path that used it first; both are entries of one topic
+  const auto takeSolid = [&solids](const YamlCursor& at, const std::string& name, bool generated) {
+    const auto [other, is_new] = solids.emplace(name, at.path());
+    if (is_new)
+      return;
+    const std::string reason = "is also the name of " + other->second + "; names of bodies and obstacles must differ";
+    generated ? at.problem("makes " + name + ", which " + reason) : at.find("name").problem(reason);
+  };
   const std::vector<YamlCursor> obstacles = entriesOf(at_obstacles), bodies = entriesOf(at_bodies);
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
-    names.take(obstacles[k], scene.obstacles[k].name, false);
+    takeSolid(obstacles[k], scene.obstacles[k].name, false);
   for (std::size_t k = 0; k < scene.bodies.size(); ++k)
-    names.take(bodies[k], scene.bodies[k].name, false);
+    takeSolid(bodies[k], scene.bodies[k].name, false);
   for (auto* made : {&generated.obstacles, &robots})
     for (auto& [obstacle, maker] : *made)
     {
-      names.take(maker, obstacle.name, true);
+      takeSolid(maker, obstacle.name, true);
       scene.obstacles.push_back(std::move(obstacle));
     }
   for (auto& [body, maker] : generated.bodies)
   {
-    names.take(maker, body.name, true);
+    takeSolid(maker, body.name, true);
     scene.bodies.push_back(std::move(body));
   }
   chooseContactMethods(cloths, rods, scene);
@@ -269,8 +278,9 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
   for (ReadRod& part : rods)
     scene.rods.push_back(std::move(part.config));
   completeThreads(scene, entriesOf(at_threads));
-  checkFollowed(scene, entriesOf(at_rods), cloths);
-  checkIgnoredContacts(scene, entriesOf(at_rods), cloths);
+  const std::vector<ListedGrasp> grasps = listedGrasps(scene, entriesOf(at_rods), cloths);
+  checkFollowed(scene, grasps);
+  checkIgnoredContacts(scene, grasps);
   checkGraspNames(scene, cloths);
   checkUnderCloth(scene, cloths);
 }
@@ -289,18 +299,15 @@ SceneConfig readTree(const YamlTree& tree, const std::string& name, const std::s
   // The largest acceleration serves scaled problems, whose lengths, masses and moduli are of order one.
   const Range acceleration = Range::closed(-1e9, 1e9, "m/s^2"),
               speed = Range::closed(-kMaxWindSpeed, kMaxWindSpeed, "m/s");
-  assign(scene.name, map.get("name", "Name of the scene. Without the key: scene.").text());
-  assign(scene.gravity,
-         map.get("gravity", "Acceleration by gravity. Without the key: [0, 0, -9.81] m/s^2.").vector3(acceleration));
+  map.get("name", scene.name, "Name of the scene. Without the key: scene.");
+  map.get("gravity", scene.gravity, acceleration, "Acceleration by gravity. Without the key: [0, 0, -9.81] m/s^2.");
   const YamlCursor wind = map.get("wind",
                                   "The air, the same everywhere. It acts on rods with `damping.drag`, and on cloths "
                                   "with `aerodynamics` or `damping.drag`.");
   YamlMap wind_map(wind);
-  assign(scene.wind,
-         wind_map.get("velocity", "Velocity of the air. Without the key: [0, 0, 0], still air.").vector3(speed));
-  const YamlCursor wind_topic =
-      wind_map.get("topic", "Whether messages on the topic `wind` set the velocity. Without the key: false.");
-  assign(scene.wind_topic, wind_topic.boolean());
+  wind_map.get("velocity", scene.wind, speed, "Velocity of the air. Without the key: [0, 0, 0], still air.");
+  const YamlCursor wind_topic = wind_map.get(
+      "topic", scene.wind_topic, "Whether messages on the topic `wind` set the velocity. Without the key: false.");
   wind_map.finish();
   scene.start = readStart(map.get("start",
                                   "How the scene starts: `as_given`, or in a static equilibrium, which the static "
@@ -367,6 +374,19 @@ std::string fileText(const std::string& path)
   if (!file)
     throw SceneError(path + ": cannot be read");
   return text.str();
+}
+
+void requireCoordinates(const Eigen::Matrix3Xd& points, const std::string& what, const std::string& where)
+{
+  if (!(points.cwiseAbs().maxCoeff() <= kMaxCoordinate))
+    throw std::runtime_error(what + "has coordinates beyond " + shortNumber(kMaxCoordinate) + " m" + where);
+}
+
+void takeName(std::map<std::string, std::string>& names, const YamlCursor& entry, const std::string& name)
+{
+  const auto [other, is_new] = names.emplace(name, entry.path());
+  if (!is_new)
+    entry.find("name").problem("is also the name of " + other->second + "; names must differ");
 }
 
 bool ReadContext::claim(const YamlCursor& at, double more) const

@@ -21,8 +21,8 @@ constexpr long max_points = 1'000'000;
 std::vector<std::string> readSeries(const YamlCursor& at)
 {
   YamlMap map(at);
-  const YamlCursor log_at = map.get("log", "Whether the values form a geometric series. Without the key: false."),
-                   from_at = map.require("from", "First value of the series.");
+  const YamlCursor log_at = map.get("log", "Whether the values form a geometric series. Without the key: false.");
+  const YamlCursor from_at = map.require("from", "First value of the series.");
   const auto from = from_at.number({}), to = map.require("to", "Last value of the series.").number({});
   const auto count = map.require("count", "Number of values.").integer(2, max_points);
   const bool log = log_at.boolean().value_or(false);
@@ -63,9 +63,9 @@ SweepPlot readPlot(const YamlCursor& at)
 {
   SweepPlot plot;
   YamlMap map(at);
-  assign(plot.x, map.require("x", "Measure or path on the horizontal axis.").text());
-  assign(plot.y, map.require("y", "Measure on the vertical axis.").text());
-  assign(plot.by, map.get("by", "Path whose values get a curve each. Without the key there is one curve.").text());
+  map.require("x", plot.x, "Measure or path on the horizontal axis.");
+  map.require("y", plot.y, "Measure on the vertical axis.");
+  map.get("by", plot.by, "Path whose values get a curve each. Without the key there is one curve.");
   plot.x_label = plot.x;
   plot.y_label = plot.y;
   plot.log = map.get("log", "Whether both axes are logarithmic. Without the key: false.").boolean().value_or(false);
@@ -114,7 +114,7 @@ void tryValues(const SweepPlan& plan, Problems& problems)
       }
       catch (const SceneError& error)
       {
-        problems.addText(error.what());
+        problems.add(error.what());
         return;   // the rest would mostly repeat it
       }
   }
@@ -173,8 +173,8 @@ SweepPlan readSweepPlan(const std::string& path)
        map.require("measures", "Names of the measures that are taken of each run.").items(1))
     if (const auto name = measure.name())
       plan.measures.push_back(*name);
-  assign(plan.after, map.get("after", "Simulated time from which measures are taken. Without the key: 0.")
-                         .number(Range::closed(0, 1e9, "s")));
+  map.get("after", plan.after, Range::closed(0, 1e9, "s"),
+          "Simulated time from which measures are taken. Without the key: 0.");
   const YamlCursor plot = map.get("plot", "Picture of the results. Without the key: none.");
   if (plot.present())
     plan.plot = readPlot(plot);

@@ -209,9 +209,9 @@ void requireKnown(const std::string& kind, const std::string& name, const Known&
   std::vector<std::string> names;
   for (const auto& entry : known)
     names.push_back(entry.first);
-  const std::string nearest = nearestWord(name, names);
+  const std::string hint = didYouMean(name, names);
   throw std::runtime_error("the robot has no " + kind + " " + name +
-                           (nearest.empty() ? "; it has: " + joinWords(names) : " (did you mean " + nearest + "?)"));
+                           (hint.empty() ? "; it has: " + joinWords(names) : hint));
 }
 
 }   // namespace

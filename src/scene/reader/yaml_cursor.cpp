@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
-
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -59,19 +56,19 @@ std::string quote(const YamlTree& tree)
 
 }   // namespace
 
-std::string shortNumber(double value)
-{
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.10g", value);
-  return buffer;
-}
-
-std::string joinWords(const std::vector<std::string>& words)
+std::string joinWords(const std::vector<std::string>& words, std::size_t most)
 {
   std::string text;
-  for (const std::string& word : words)
-    text += (text.empty() ? "" : ", ") + word;
+  for (std::size_t k = 0; k < std::min(words.size(), most); ++k)
+    text += (text.empty() ? "" : ", ") + words[k];
   return text;
+}
+
+std::string trimmed(const std::string& text)
+{
+  const char* const blank = " \t\r\n";
+  const auto first = text.find_first_not_of(blank);
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(blank) - first + 1);
 }
 
 std::string nearestWord(const std::string& word, const std::vector<std::string>& words)
@@ -91,6 +88,12 @@ std::string nearestWord(const std::string& word, const std::vector<std::string>&
   return best;
 }
 
+std::string didYouMean(const std::string& word, const std::vector<std::string>& words)
+{
+  const std::string nearest = nearestWord(word, words);
+  return nearest.empty() ? "" : " (did you mean " + nearest + "?)";
+}
+
 std::string Range::text() const
 {
   const std::string unit_text = *unit ? std::string(" ") + unit : "";
@@ -100,35 +103,8 @@ std::string Range::text() const
          (open_high ? ")" : "]") + unit_text;
 }
 
-std::string Problems::placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const
+void Problems::warn(const std::string& line)
 {
-  const YamlTree* place = tree ? tree : parent;
-  std::string line = file_;
-  if (place && !place->origin.empty())
-    line = place->origin;
-  else if (place && place->line > 0)
-    line += ":" + std::to_string(place->line);
-  return line + ": " + (path.empty() ? "scene" : path);
-}
-
-std::string Problems::lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path,
-                             const std::string& reason) const
-{
-  std::string line = placeOf(tree, parent, path);
-  const std::string value = tree ? quote(*tree) : "";
-  if (!value.empty())
-    line += " = " + value;
-  return line + ": " + reason;
-}
-
-void Problems::add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason)
-{
-  lines_.push_back(lineOf(tree, parent, path, reason));
-}
-
-void Problems::warn(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& text)
-{
-  const std::string line = lineOf(tree, parent, path, text);
   if (warnings_.size() < max_reported && std::find(warnings_.begin(), warnings_.end(), line) == warnings_.end())
     warnings_.push_back(line);
 }
@@ -141,6 +117,23 @@ std::string Problems::text() const
   if (lines_.size() > max_reported)
     text += "\n" + file_ + ": and " + std::to_string(lines_.size() - max_reported) + " more problems";
   return text;
+}
+
+std::string YamlCursor::place() const
+{
+  const YamlTree* place = tree_ ? tree_ : parent_;
+  std::string line = problems_->file();
+  if (place && !place->origin.empty())
+    line = place->origin;
+  else if (place && place->line > 0)
+    line += ":" + std::to_string(place->line);
+  return line + ": " + (path_.empty() ? "scene" : path_);
+}
+
+std::string YamlCursor::line(const std::string& text) const
+{
+  const std::string value = tree_ ? quote(*tree_) : "";
+  return place() + (value.empty() ? "" : " = " + value) + ": " + text;
 }
 
 bool YamlCursor::check(YamlTree::Kind kind, const char* expected) const
@@ -157,7 +150,7 @@ bool YamlCursor::check(YamlTree::Kind kind, const char* expected) const
 
 std::optional<double> YamlCursor::number(const Range& range) const
 {
-  problems_->asked(path_, "a number " + range.text());
+  asked("a number " + range.text());
   return numberIn(range, "a number " + range.text());
 }
 
@@ -167,20 +160,11 @@ std::optional<double> YamlCursor::numberIn(const Range& range, const std::string
     return std::nullopt;
   const auto value = parseNumber(tree_->scalar);
   if (!value)
-  {
-    problem("is not a number; must be " + expected);
-    return std::nullopt;
-  }
+    return problem("is not a number; must be " + expected);
   if (!std::isfinite(*value))
-  {
-    problem("is not finite; must be " + expected);
-    return std::nullopt;
-  }
+    return problem("is not finite; must be " + expected);
   if (!range.holds(*value))
-  {
-    problem("is out of range; must be " + expected);
-    return std::nullopt;
-  }
+    return problem("is out of range; must be " + expected);
   return value;
 }
 
@@ -190,19 +174,16 @@ std::optional<int> YamlCursor::integer(long low, long high, const char* unit) co
   const bool index = low == -high - 1;
   const std::string expected =
       "a whole number " + range.text() + (index ? ", an index from 0 or, if it is negative, from the end" : "");
-  problems_->asked(path_, index ? "an index from 0 or, if it is negative, from the end" : expected);
+  asked(index ? "an index from 0 or, if it is negative, from the end" : expected);
   const auto value = numberIn(range, expected);
   if (value && *value != std::floor(*value))
-  {
-    problem("must be " + expected);
-    return std::nullopt;
-  }
+    return problem("must be " + expected);
   return value ? std::optional<int>(static_cast<int>(*value)) : std::nullopt;
 }
 
 std::optional<bool> YamlCursor::boolean() const
 {
-  problems_->asked(path_, "true or false");
+  asked("true or false");
   if (!check(YamlTree::Kind::scalar, "true or false"))
     return std::nullopt;
   std::string word = tree_->scalar;
@@ -211,13 +192,12 @@ std::optional<bool> YamlCursor::boolean() const
     return true;
   if (word == "false" || word == "no" || word == "off")
     return false;
-  problem("must be true or false");
-  return std::nullopt;
+  return problem("must be true or false");
 }
 
 std::optional<std::string> YamlCursor::text() const
 {
-  problems_->asked(path_, "a text");
+  asked("a text");
   return word();
 }
 
@@ -226,10 +206,7 @@ std::optional<std::string> YamlCursor::word() const
   if (!check(YamlTree::Kind::scalar, "a text"))
     return std::nullopt;
   if (tree_->scalar.empty())
-  {
-    problem("is empty; must be a text");
-    return std::nullopt;
-  }
+    return problem("is empty; must be a text");
   return tree_->scalar;
 }
 
@@ -248,13 +225,10 @@ std::string whyNoName(const std::string& name)
 
 std::optional<std::string> YamlCursor::name() const
 {
-  problems_->asked(path_, "a name");
+  asked("a name");
   auto name = word();
   if (const std::string why = name ? whyNoName(*name) : ""; !why.empty())
-  {
-    problem(why);
-    return std::nullopt;
-  }
+    return problem(why);
   return name;
 }
 
@@ -267,36 +241,28 @@ void YamlCursor::checkOwnName(const std::string& name) const
 std::optional<Eigen::Vector3d> YamlCursor::vector3(const Range& range) const
 {
   const std::string expected = "a list [x, y, z] of numbers " + range.text();
-  problems_->asked(path_, expected);
+  asked(expected);
   if (!check(YamlTree::Kind::list, expected.c_str()))
     return std::nullopt;
   if (tree_->items.size() != 3)
-  {
-    problem("has " + std::to_string(tree_->items.size()) + " entries; must be " + expected);
-    return std::nullopt;
-  }
-  Eigen::Vector3d vector;
-  bool good = true;
-  const auto entries = items();
-  for (int k = 0; k < 3; ++k)
-  {
-    const auto value = entries[k].numberIn(range, "a number " + range.text());
-    good = good && value;
-    vector[k] = value.value_or(0.0);
-  }
-  return good ? std::optional<Eigen::Vector3d>(vector) : std::nullopt;
+    return problem("has " + std::to_string(tree_->items.size()) + " entries; must be " + expected);
+  const auto values = numbersIn(range);
+  return values ? std::optional<Eigen::Vector3d>(Eigen::Map<const Eigen::Vector3d>(values->data())) : std::nullopt;
 }
 
 std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
 {
-  problems_->asked(path_, "a number or a list of numbers " + range.text());
+  asked("a number or a list of numbers " + range.text());
   if (!tree_)
     return std::nullopt;
-  if (!isList())
-  {
-    const auto value = numberIn(range, "a number " + range.text());
-    return value ? std::make_optional(std::vector<double>{*value}) : std::nullopt;
-  }
+  if (isList())
+    return numbersIn(range);
+  const auto value = numberIn(range, "a number " + range.text());
+  return value ? std::make_optional(std::vector<double>{*value}) : std::nullopt;
+}
+
+std::optional<std::vector<double>> YamlCursor::numbersIn(const Range& range) const
+{
   std::vector<double> values;
   bool good = true;
   for (const YamlCursor& item : items())
@@ -311,15 +277,13 @@ std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
 int YamlCursor::chosen(const std::vector<std::string>& words) const
 {
   const std::string expected = "one of: " + joinWords(words);
-  problems_->asked(path_, expected);
+  asked(expected);
   if (!check(YamlTree::Kind::scalar, expected.c_str()))
     return -1;
   const auto found = std::find(words.begin(), words.end(), tree_->scalar);
   if (found == words.end())
   {
-    const std::string nearest = nearestWord(tree_->scalar, words);
-    problem("is not known; must be " + expected + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
-            shortMeaning());
+    problem("is not known; must be " + expected + didYouMean(tree_->scalar, words) + shortMeaning());
     return -1;
   }
   return static_cast<int>(found - words.begin());
@@ -328,7 +292,7 @@ int YamlCursor::chosen(const std::vector<std::string>& words) const
 std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_size) const
 {
   std::vector<YamlCursor> entries;
-  problems_->asked(path_, "");
+  asked("");
   if (!check(YamlTree::Kind::list, "a list"))
     return entries;
   const std::size_t size = tree_->items.size();
@@ -342,7 +306,7 @@ std::vector<YamlCursor> YamlCursor::items(std::size_t min_size, std::size_t max_
   }
   entries.reserve(size);
   for (std::size_t k = 0; k < size; ++k)
-    entries.emplace_back(&tree_->items[k], tree_, path_ + "." + std::to_string(k), *problems_);
+    entries.emplace_back(&tree_->items[k], tree_, below(std::to_string(k)), *problems_);
   return entries;
 }
 
@@ -360,14 +324,19 @@ std::string YamlCursor::shortMeaning() const
 std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members(const char* meaning) const
 {
   std::vector<std::pair<std::string, YamlCursor>> entries;
-  problems_->named(path_);
-  problems_->means(path_ + (path_.empty() ? "" : ".") + "NAME", meaning);
+  if (KeyLog* log = problems_->log())
+  {
+    log->noteNamed(path_);
+    log->noteMeaning(below("NAME"), meaning);
+  }
   if (!check(YamlTree::Kind::map, "a map of names"))
     return entries;
   for (const auto& [key, value] : tree_->members)
-    entries.emplace_back(key, YamlCursor(&value, tree_, path_ + (path_.empty() ? "" : ".") + key, *problems_));
+    entries.emplace_back(key, YamlCursor(&value, tree_, below(key), *problems_));
   return entries;
 }
+
+YamlCursor YamlCursor::find(const std::string& key) const { return YamlMap(*this).find(key); }
 
 YamlMap::YamlMap(const YamlCursor& at) : at_(at)
 {
@@ -380,14 +349,14 @@ YamlMap::YamlMap(const YamlCursor& at) : at_(at)
 YamlCursor YamlMap::childOf(const std::string& key, const char* meaning) const
 {
   const YamlTree* value = map_ ? map_->find(key) : nullptr;
-  return YamlCursor(value, at_.tree(), at_.path() + (at_.path().empty() ? "" : ".") + key, at_.problems(), meaning);
+  return YamlCursor(value, at_.tree(), at_.below(key), at_.problems(), meaning);
 }
 
 YamlCursor YamlMap::get(const std::string& key, const char* meaning)
 {
   const YamlCursor child = childOf(key, meaning);
-  at_.problems().asked(child.path(), "");
-  at_.problems().means(child.path(), meaning);
+  if (KeyLog* log = at_.problems().log())
+    log->noteMeaning(child.path(), meaning);
   known_.push_back(key);
   return child;
 }
@@ -409,15 +378,8 @@ void YamlMap::finish()
   if (!map_)
     return;
   for (const auto& [key, value] : map_->members)
-  {
     if (std::find(known_.begin(), known_.end(), key) == known_.end())
-    {
-      const std::string nearest = nearestWord(key, known_);
-      at_.problems().add(&value, map_, at_.path() + (at_.path().empty() ? "" : ".") + key,
-                         "unknown key" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)") +
-                             "; known here: " + joinWords(known_));
-    }
-  }
+      find(key).problem("unknown key" + didYouMean(key, known_) + "; known here: " + joinWords(known_));
 }
 
 }   // namespace slender

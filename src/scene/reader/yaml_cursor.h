@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <limits>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "key_log.h"
+#include "yaml_number.h"
 #include "yaml_tree.h"
 
 namespace slender {
@@ -32,6 +34,18 @@ struct Range
   static Range between(double low, double high, const char* unit = "") { return {low, high, true, true, unit}; }
 };
 
+/// Overwrites `target` when there is a value.
+template <class Target, class Value>
+void assign(Target& target, const std::optional<Value>& value)
+{
+  if (value)
+    target = *value;
+}
+
+/// The words that a key takes, each with the value that it stands for.
+template <class Value>
+using Choices = std::vector<std::pair<std::string, Value>>;
+
 /// Everything wrong with one scene, in the order found.
 class Problems
 {
@@ -39,57 +53,20 @@ public:
   /// `log`: gets every key that is asked for; may be null.
   explicit Problems(std::string file, KeyLog* log = nullptr) : file_(std::move(file)), log_(log) {}
 
-  /// Adds "FILE:LINE: PATH = VALUE: reason" (or the override in place of file and line). `tree` may be null: then
-  /// `parent` tells the line.
-  void add(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& reason);
-  /// "FILE:LINE: PATH".
-  std::string placeOf(const YamlTree* tree, const YamlTree* parent, const std::string& path) const;
-  void addText(const std::string& line) { lines_.push_back(line); }
-  /// Adds the warning "FILE:LINE: PATH = VALUE: text", once. Warnings do not make the scene unusable: empty() does not
-  /// count them.
-  void warn(const YamlTree* tree, const YamlTree* parent, const std::string& path, const std::string& text);
+  void add(const std::string& line) { lines_.push_back(line); }
+  /// Adds a warning, once. Warnings do not make the scene unusable: empty() does not count them.
+  void warn(const std::string& line);
   const std::vector<std::string>& warnings() const { return warnings_; }
+  const std::string& file() const { return file_; }
 
   bool empty() const { return lines_.empty(); }
   std::size_t size() const { return lines_.size(); }
   std::string text() const;
-  /// Notes a key that is asked for, and the values that it may have.
-  void asked(const std::string& path, const std::string& what) const
-  {
-    if (log_)
-      log_->note(path, what);
-  }
-  /// Notes what a key means.
-  void means(const std::string& path, const char* meaning) const
-  {
-    if (log_)
-      log_->noteMeaning(path, meaning);
-  }
-  /// Notes the values that a key may have, in words that replace those of the typed getters.
-  void takes(const std::string& path, const char* what) const
-  {
-    if (log_)
-      log_->noteValue(path, what);
-  }
-  /// Notes that the keys below a path are those below the key `owner`.
-  void sharesKeys(const std::string& path, const char* owner) const
-  {
-    if (log_)
-      log_->noteShared(path, owner);
-  }
-  /// What is below has names that the user gives.
-  void named(const std::string& path) const
-  {
-    if (log_)
-      log_->noteNamed(path);
-  }
+  KeyLog* log() const { return log_; }
 
 private:
   std::string file_;
   KeyLog* log_;
-  std::string lineOf(const YamlTree* tree, const YamlTree* parent, const std::string& path,
-                     const std::string& reason) const;
-
   std::vector<std::string> lines_, warnings_;
 };
 
@@ -113,32 +90,58 @@ public:
   bool isScalar() const { return tree_ && tree_->kind == YamlTree::Kind::scalar; }
   bool isList() const { return tree_ && tree_->kind == YamlTree::Kind::list; }
   bool isMap() const { return tree_ && tree_->kind == YamlTree::Kind::map; }
+  bool isWord(const char* word) const { return isScalar() && tree_->scalar == word; }
   const YamlTree* tree() const { return tree_; }
   const std::string& path() const { return path_; }
   Problems& problems() const { return *problems_; }
 
-  /// "FILE:LINE: PATH", for messages of those who take the value over.
-  std::string place() const { return problems_->placeOf(tree_, parent_, path_); }
-  /// Reports what is wrong with this value.
-  void problem(const std::string& reason) const { problems_->add(tree_, parent_, path_, reason); }
+  /// "FILE:LINE: PATH" (or the override in place of file and line), for messages of those who take the value over.
+  std::string place() const;
+  /// Reports "FILE:LINE: PATH = VALUE: reason": what is wrong with this value. Returns nothing, as a reader does that
+  /// reports.
+  std::nullopt_t problem(const std::string& reason) const
+  {
+    problems_->add(line(reason));
+    return std::nullopt;
+  }
+  /// Calls an action. Reports what it throws, and returns false then.
+  template <class Action>
+  bool attempt(const Action& action) const
+  {
+    try
+    {
+      action();
+      return true;
+    }
+    catch (const std::exception& error)
+    {
+      problem(error.what());
+      return false;
+    }
+  }
   /// Warns of this value: the scene runs, but not as its writer may expect. The text says what happens instead and what
   /// to do.
-  void warning(const std::string& text) const { problems_->warn(tree_, parent_, path_, text); }
+  void warning(const std::string& text) const { problems_->warn(line(text)); }
 
   /// Says in the reference of scene files that the keys below this one are those below the key `owner`, for example
   /// "rods.N.material". The reference describes them there alone.
   const YamlCursor& sharesKeysOf(const char* owner) const
   {
-    problems_->sharesKeys(path_, owner);
+    if (KeyLog* log = problems_->log())
+      log->noteShared(path_, owner);
     return *this;
   }
   /// Says in the reference of scene files which values this key takes, where the typed getters below would say it less
   /// well: for tables, for lists of lists, and for bounds that depend on other keys.
   const YamlCursor& takes(const char* values) const
   {
-    problems_->takes(path_, values);
+    if (KeyLog* log = problems_->log())
+      log->noteValue(path_, values);
     return *this;
   }
+
+  /// The value of a key of this map, which has been read elsewhere with its meaning.
+  YamlCursor find(const std::string& key) const;
 
   std::optional<double> number(const Range& range) const;
   std::optional<int> integer(long low, long high, const char* unit = "") const;
@@ -154,13 +157,29 @@ public:
   std::optional<std::vector<double>> numbers(const Range& range) const;
 
   template <class Value>
-  std::optional<Value> choice(const std::vector<std::pair<std::string, Value>>& choices) const
+  std::optional<Value> choice(const Choices<Value>& choices) const
   {
     std::vector<std::string> words;
     for (const auto& entry : choices)
       words.push_back(entry.first);
     const int found = chosen(words);
     return found < 0 ? std::nullopt : std::optional<Value>(choices[found].second);
+  }
+
+  /// Each of these reads the value into `target`, which stays as it is when the value is absent or wrong.
+  void read(double& target, const Range& range) const { assign(target, number(range)); }
+  void read(std::optional<double>& target, const Range& range) const { assign(target, number(range)); }
+  void read(int& target, const Range& closed) const
+  {
+    assign(target, integer(static_cast<long>(closed.low), static_cast<long>(closed.high), closed.unit));
+  }
+  void read(Eigen::Vector3d& target, const Range& range) const { assign(target, vector3(range)); }
+  void read(bool& target) const { assign(target, boolean()); }
+  void read(std::string& target) const { assign(target, text()); }
+  template <class Value>
+  void read(Value& target, const Choices<Value>& choices) const
+  {
+    assign(target, choice(choices));
   }
 
   /// Entries of a list; reports and returns none for anything else. `size`: allowed sizes.
@@ -171,11 +190,20 @@ public:
   std::vector<std::pair<std::string, YamlCursor>> members(const char* meaning) const;
 
 private:
+  std::string line(const std::string& text) const;
   std::optional<double> numberIn(const Range& range, const std::string& expected) const;
+  std::optional<std::vector<double>> numbersIn(const Range& range) const;   ///< of a list
   std::optional<std::string> word() const;
   bool check(YamlTree::Kind kind, const char* expected) const;
+  /// Notes in the log that the key is asked for, and the values that it may have.
+  void asked(const std::string& what) const
+  {
+    if (KeyLog* log = problems_->log())
+      log->note(path_, what);
+  }
   int chosen(const std::vector<std::string>& words) const;
   std::string shortMeaning() const;
+  std::string below(const std::string& key) const { return path_ + (path_.empty() ? "" : ".") + key; }
 
   friend class YamlMap;
 
@@ -197,6 +225,34 @@ public:
   YamlCursor get(const std::string& key, const char* meaning);
   /// Like get(), but reports a key that is missing.
   YamlCursor require(const std::string& key, const char* meaning);
+  /// These also read the value into `target`, which stays as it is when the value is absent or wrong. `allowed` is what
+  /// YamlCursor::read() takes for such a target: a range, or words with their values.
+  template <class Target>
+  YamlCursor get(const std::string& key, Target& target, const Range& allowed, const char* meaning)
+  {
+    return read(get(key, meaning), target, allowed);
+  }
+  template <class Target>
+  YamlCursor get(const std::string& key, Target& target, const Choices<Target>& allowed, const char* meaning)
+  {
+    return read(get(key, meaning), target, allowed);
+  }
+  template <class Target>
+  YamlCursor get(const std::string& key, Target& target, const char* meaning)
+  {
+    return read(get(key, meaning), target);
+  }
+  template <class Target>
+  YamlCursor require(const std::string& key, Target& target, const Range& allowed, const char* meaning)
+  {
+    return read(require(key, meaning), target, allowed);
+  }
+  YamlCursor require(const std::string& key, std::string& target, const char* meaning)
+  {
+    return read(require(key, meaning), target);
+  }
+  /// The key `name`, whose value must be a name.
+  void getName(std::string& target, const char* meaning) { assign(target, get("name", meaning).name()); }
   /// A key that has been read elsewhere with its meaning, for checks that concern several keys.
   YamlCursor find(const std::string& key) const;
   /// Reports that a key is missing that only some of the other values need. The key has been read with its meaning.
@@ -207,25 +263,26 @@ public:
 
 private:
   YamlCursor childOf(const std::string& key, const char* meaning) const;
+  template <class Target, class... Allowed>
+  static YamlCursor read(const YamlCursor& at, Target& target, const Allowed&... allowed)
+  {
+    at.read(target, allowed...);
+    return at;
+  }
 
   YamlCursor at_;
   const YamlTree* map_ = nullptr;
   std::vector<std::string> known_;
 };
 
-/// Overwrites `target` when there is a value.
-template <class Target, class Value>
-void assign(Target& target, const std::optional<Value>& value)
-{
-  if (value)
-    target = *value;
-}
-
-/// "1.5e-3" rather than "0.001500".
-std::string shortNumber(double value);
-
 /// The word most like `word` (few edits), or empty.
 std::string nearestWord(const std::string& word, const std::vector<std::string>& words);
-std::string joinWords(const std::vector<std::string>& words);
+/// " (did you mean WORD?)" with the nearest word, or empty.
+std::string didYouMean(const std::string& word, const std::vector<std::string>& words);
+/// The first words with commas between them, at most so many.
+std::string joinWords(const std::vector<std::string>& words,
+                      std::size_t most = std::numeric_limits<std::size_t>::max());
+/// The text without blanks at its ends.
+std::string trimmed(const std::string& text);
 
 }   // namespace slender

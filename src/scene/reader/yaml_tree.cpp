@@ -9,7 +9,6 @@
 
 #include "slender_sim/scene/reader.h"
 #include "yaml_cursor.h"
-#include "yaml_number.h"
 
 namespace slender {
 
@@ -147,7 +146,7 @@ private:
   std::size_t count_ = 0;
 };
 
-void emit(YAML::Emitter& out, const YamlTree& tree, int depth)
+void emit(YAML::Emitter& out, const YamlTree& tree)
 {
   switch (tree.kind)
   {
@@ -162,7 +161,7 @@ void emit(YAML::Emitter& out, const YamlTree& tree, int depth)
         out << YAML::Flow;
       out << YAML::BeginSeq;
       for (const YamlTree& item : tree.items)
-        emit(out, item, depth + 1);
+        emit(out, item);
       out << YAML::EndSeq;
       break;
     }
@@ -171,7 +170,7 @@ void emit(YAML::Emitter& out, const YamlTree& tree, int depth)
       for (const auto& [key, value] : tree.members)
       {
         out << YAML::Key << key << YAML::Value;
-        emit(out, value, depth + 1);
+        emit(out, value);
       }
       out << YAML::EndMap;
       break;
@@ -186,17 +185,6 @@ void setOrigin(YamlTree& tree, const std::string& origin)
     setOrigin(item, origin);
   for (auto& member : tree.members)
     setOrigin(member.second, origin);
-}
-
-std::vector<std::string> split(const std::string& path)
-{
-  std::vector<std::string> parts(1);
-  for (char c : path)
-    if (c == '.')
-      parts.emplace_back();
-    else
-      parts.back() += c;
-  return parts;
 }
 
 /// " (0 is rope, 1 is cable)", for a list whose entries have names; of long lists the first ones.
@@ -230,16 +218,14 @@ std::optional<double> placeIn(const YamlTree& list, const std::string& part)
 void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::string& name, std::size_t parts,
                        const std::string& where)
 {
-  const std::vector<std::string> passed = split(path);
+  const std::vector<std::string> passed = splitPath(path);
   if (passed.back() != "grasps" || parts == passed.size() + 1)
     return;
   std::vector<std::string> names;
   for (const auto& member : map.members)
     names.push_back(member.first);
-  const std::string nearest = nearestWord(name, names);
   throw SceneError(where + ": " + path + " has no grasp '" + name + "'" +
-                   (names.empty() ? "" : "; it has: " + joinWords(names)) +
-                   (nearest.empty() ? "" : " (did you mean " + nearest + "?)"));
+                   (names.empty() ? "" : "; it has: " + joinWords(names)) + didYouMean(name, names));
 }
 
 }   // namespace
@@ -269,6 +255,17 @@ YamlTree* YamlTree::find(const std::string& key)
   return const_cast<YamlTree*>(static_cast<const YamlTree*>(this)->find(key));
 }
 
+std::vector<std::string> splitPath(const std::string& path)
+{
+  std::vector<std::string> parts(1);
+  for (char c : path)
+    if (c == '.')
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  return parts;
+}
+
 YamlTree parseYaml(const std::string& text, const std::string& file)
 {
   try
@@ -292,7 +289,7 @@ YamlTree parseYaml(const std::string& text, const std::string& file)
 std::string writeYaml(const YamlTree& tree)
 {
   YAML::Emitter out;
-  emit(out, tree, 0);
+  emit(out, tree);
   return std::string(out.c_str()) + "\n";
 }
 
@@ -307,7 +304,7 @@ void applyOverride(YamlTree& root, const std::string& assignment, const std::str
 
   YamlTree* at = &root;
   std::string passed;
-  const std::vector<std::string> parts = split(assignment.substr(0, equals));
+  const std::vector<std::string> parts = splitPath(assignment.substr(0, equals));
   for (const std::string& part : parts)
   {
     const std::string here = passed.empty() ? "the scene" : "'" + passed + "'";

@@ -25,6 +25,10 @@ public:
       bytes_.resize(at + sizeof(T));
       std::memcpy(&bytes_[at], &value, sizeof(T));
     }
+    else if constexpr (std::is_enum_v<T>)
+    {
+      (*this)(static_cast<int>(value));
+    }
     else
     {
       (*this)(static_cast<std::int64_t>(value.rows()));
@@ -34,6 +38,12 @@ public:
       if (size > 0)
         std::memcpy(&bytes_[at], value.data(), size);
     }
+  }
+
+  template <class... T>
+  void all(const T&... values)
+  {
+    ((*this)(values), ...);
   }
 
   template <class T>

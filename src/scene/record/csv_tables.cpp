@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <set>
 
 #include "earlier_run.h"
@@ -35,38 +34,35 @@ const std::string& clearedFolder(const std::string& folder)
 struct CsvTables::Files
 {
   std::string folder;
-  TextFile nodes, grasps;
-  std::optional<TextFile> bodies, threads, cloths, tracking;   // only scenes that have any
-  std::map<std::string, TextFile> fields;                      // by name of the table
+  std::map<std::string, TextFile> tables;   ///< by name
 
-  explicit Files(const std::string& to)
-    : folder(clearedFolder(to)),
-      nodes(to + "/nodes.csv"),
-      grasps(to + "/grasps.csv")
+  explicit Files(const std::string& to) : folder(clearedFolder(to)) {}
+
+  /// The table of this name. It begins with the header.
+  TextFile& opened(const std::string& name, const std::string& header)
   {
+    auto table = tables.find(name);
+    if (table == tables.end())
+    {
+      table = tables.emplace(name, TextFile(folder + "/" + name + ".csv")).first;
+      table->second.row(header);
+    }
+    return table->second;
   }
 
-  TextFile& opened(std::optional<TextFile>& file, const char* name, const char* header)
+  TextFile& nodes()
   {
-    if (!file)
-    {
-      file.emplace(folder + name);
-      *file << header;
-      file->endLine();
-    }
-    return *file;
+    return opened("nodes", "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],d1x,d1y,d1z,twist [rad]");
+  }
+  TextFile& grasps()
+  {
+    return opened(
+        "grasps",
+        "t [s],object,grasp,active,x [m],y [m],z [m],qx,qy,qz,qw,fx [N],fy [N],fz [N],tx [N m],ty [N m],tz [N m]");
   }
 };
 
 namespace {
-
-void put(TextFile& file, const Pose& pose)
-{
-  const Eigen::Vector4d q = pose.orientation.coeffs();
-  file.vector(pose.position, ',') << ',';
-  file.vector(q.head<3>(), ',') << ',';
-  file.number(q[3]);
-}
 
 /// Calls row(index) for the chosen ones of `count` nodes of an object.
 template <class Row>
@@ -85,66 +81,32 @@ void writeRod(TextFile& file, double time, const RodSnapshot& rod, const NodeCho
 {
   const Eigen::Index edges = static_cast<Eigen::Index>(rod.frames.size());
   eachChosen(nodes, rod.name, rod.x.cols(), [&](Eigen::Index i) {
-    file.number(time) << ',' << rod.name << ',';
-    file.number(i) << ',';
-    file.vector(rod.x.col(i), ',') << ',';
-    file.vector(rod.v.col(i), ',') << ',';
     // of the frame as it is published, so that tables made from bags are the same to the last digit
-    file.vector(rod.frames[std::min(i, edges - 1)] * Eigen::Vector3d::UnitY(), ',') << ',';
-    file.number(rod.twist[i]);
-    file.endLine();
+    const Eigen::Vector3d d1 = rod.frames[std::min(i, edges - 1)] * Eigen::Vector3d::UnitY();
+    file.row(time, rod.name, i, rod.x.col(i), rod.v.col(i), d1, rod.twist[i]);
   });
 }
 
 void writeThread(TextFile& file, double time, const ThreadSnapshot& thread)
 {
   for (Eigen::Index i = 0; i < thread.x.cols(); ++i)
-  {
-    file.number(time) << ',' << thread.name << ',';
-    file.number(thread.thread_id) << ',';
-    file.number(thread.ids[i]) << ',';
-    file.vector(thread.x.col(i), ',') << ',';
-    file.vector(thread.v.col(i), ',') << ',';
-    file.number(thread.radius[std::min(i, thread.radius.size() - 1)]) << (thread.deposited[i] ? ",1" : ",0");
-    file.endLine();
-  }
+    file.row(time, thread.name, thread.thread_id, thread.ids[i], thread.x.col(i), thread.v.col(i),
+             thread.radius[std::min(i, thread.radius.size() - 1)], thread.deposited[i] ? 1 : 0);
 }
 
 void writeCloth(TextFile& file, double time, const ClothSnapshot& cloth, const NodeChoice& nodes)
 {
-  eachChosen(nodes, cloth.name, cloth.x.cols(), [&](Eigen::Index i) {
-    file.number(time) << ',' << cloth.name << ',';
-    file.number(i) << ',';
-    file.vector(cloth.x.col(i), ',') << ',';
-    file.vector(cloth.v.col(i), ',');
-    file.endLine();
-  });
+  eachChosen(nodes, cloth.name, cloth.x.cols(),
+             [&](Eigen::Index i) { file.row(time, cloth.name, i, cloth.x.col(i), cloth.v.col(i)); });
 }
 
 void writeGrasp(TextFile& file, double time, const GraspSnapshot& grasp)
 {
-  file.number(time) << ',' << (grasp.held ? grasp.held->object : std::string()) << ',' << grasp.name << ',';
+  const auto& [force, torque] = grasp.wrench;
   if (grasp.held)
-  {
-    file << (grasp.held->active ? "1," : "0,");
-    put(file, grasp.held->X_WG);
-  }
+    file.row(time, grasp.held->object, grasp.name, grasp.held->active ? 1 : 0, grasp.held->X_WG, force, torque);
   else
-    file << ",,,,,,,";
-  file << ',';
-  file.vector(grasp.wrench.force, ',') << ',';
-  file.vector(grasp.wrench.torque, ',');
-  file.endLine();
-}
-
-void writeSolid(TextFile& file, double time, const SolidSnapshot& solid)
-{
-  file.number(time) << ',' << solid.name << ',';
-  put(file, solid.pose);
-  file << ',';
-  file.vector(solid.velocity.linear, ',') << ',';
-  file.vector(solid.velocity.angular, ',');
-  file.endLine();
+    file.row(time, "", grasp.name, "", "", "", "", "", "", "", "", force, torque);
 }
 
 /// Tables of threads, and of whole objects (energies), have all their rows.
@@ -154,18 +116,15 @@ void writeFields(TextFile& file, double time, const FieldTable& table, const Nod
 {
   const bool indexed = table.values.rows() > 1;
   eachChosen(isOfNodes(table) ? nodes : NodeChoice(), table.object, table.values.rows(), [&](Eigen::Index i) {
-    file.number(time) << ',' << table.object;
+    file.cell(time);
+    file.cell(table.object);
     if (indexed)
-    {
-      file << ',';
-      file.number(i);
-    }
-    for (Eigen::Index k = 0; k < table.values.cols(); ++k)
-    {
-      file << ',';
-      if (!std::isnan(table.values(i, k)))
-        file.number(table.values(i, k));
-    }
+      file.cell(i);
+    for (const double value : table.values.row(i))
+      if (std::isnan(value))
+        file.cell("");
+      else
+        file.cell(value);
     file.endLine();
   });
 }
@@ -182,11 +141,8 @@ std::string headerOf(const FieldTable& table)
 
 CsvTables::CsvTables(const std::string& folder) : files_(std::make_unique<Files>(folder))
 {
-  files_->nodes << "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],d1x,d1y,d1z,twist [rad]";
-  files_->nodes.endLine();
-  files_->grasps
-      << "t [s],object,grasp,active,x [m],y [m],z [m],qx,qy,qz,qw,fx [N],fy [N],fz [N],tx [N m],ty [N m],tz [N m]";
-  files_->grasps.endLine();
+  files_->nodes();   // these two are there also where the scene has no rods and no grasps
+  files_->grasps();
 }
 
 CsvTables::~CsvTables() = default;
@@ -195,56 +151,35 @@ void CsvTables::write(const SceneSnapshot& instant, const NodeChoice& nodes)
 {
   const double time = instant.time;
   for (const RodSnapshot& rod : instant.rods)
-    writeRod(files_->nodes, time, rod, nodes);
+    writeRod(files_->nodes(), time, rod, nodes);
   for (const ThreadSnapshot& thread : instant.threads)
     writeThread(
-        files_->opened(files_->threads, "/threads.csv",
+        files_->opened("threads",
                        "t [s],object,thread,id,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s],radius [m],deposited"),
         time, thread);
   for (const ClothSnapshot& cloth : instant.cloths)
-    writeCloth(files_->opened(files_->cloths, "/cloths.csv",
-                              "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s]"),
-               time, cloth, nodes);
+    writeCloth(files_->opened("cloths", "t [s],object,index,x [m],y [m],z [m],vx [m/s],vy [m/s],vz [m/s]"), time, cloth,
+               nodes);
   for (const FunctionSnapshot& function : instant.functions)
-  {
-    TextFile& file = files_->opened(files_->tracking, "/tracking.csv",
-                                    "t [s],object,function,x [m],y [m],z [m],fx [N],fy [N],fz [N]");
-    file.number(time) << ',' << function.object << ',' << function.name << ',';
-    file.vector(function.average, ',') << ',';
-    file.vector(function.force, ',');
-    file.endLine();
-  }
+    files_->opened("tracking", "t [s],object,function,x [m],y [m],z [m],fx [N],fy [N],fz [N]")
+        .row(time, function.object, function.name, function.average, function.force);
   for (const GraspSnapshot& grasp : instant.grasps)
-    writeGrasp(files_->grasps, time, grasp);
+    writeGrasp(files_->grasps(), time, grasp);
   for (const auto* solids : {&instant.bodies, &instant.obstacles})
     for (const SolidSnapshot& solid : *solids)
-      writeSolid(
-          files_->opened(
-              files_->bodies, "/bodies.csv",
-              "t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s],vy [m/s],vz [m/s],wx [rad/s],wy [rad/s],wz [rad/s]"),
-          time, solid);
+      files_
+          ->opened(
+              "bodies",
+              "t [s],object,x [m],y [m],z [m],qx,qy,qz,qw,vx [m/s],vy [m/s],vz [m/s],wx [rad/s],wy [rad/s],wz [rad/s]")
+          .row(time, solid.name, solid.pose, solid.velocity.linear, solid.velocity.angular);
   for (const FieldTable& table : instant.fields)
-  {
-    auto place = files_->fields.find(table.table);
-    if (place == files_->fields.end())
-    {
-      place = files_->fields.emplace(table.table, TextFile(files_->folder + "/" + table.table + ".csv")).first;
-      place->second << headerOf(table);
-      place->second.endLine();
-    }
-    writeFields(place->second, time, table, nodes);
-  }
+    writeFields(files_->opened(table.table, headerOf(table)), time, table, nodes);
 }
 
 void CsvTables::finish()
 {
-  files_->nodes.close();
-  files_->grasps.close();
-  for (auto* file : {&files_->bodies, &files_->threads, &files_->cloths, &files_->tracking})
-    if (*file)
-      (*file)->close();
-  for (auto& [name, file] : files_->fields)
-    file.close();
+  for (auto& [name, table] : files_->tables)
+    table.close();
 }
 
 }   // namespace slender

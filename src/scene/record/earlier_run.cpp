@@ -24,8 +24,8 @@ void clearEarlierRun(const std::string& folder, const std::function<bool(const s
     if (!start.empty() && start != beginning)
     {
       throw std::runtime_error(entry.path().string() +
-                               ": was not written by slender_sim, and would be mixed with what is written now; "
-                               "move it away, or name another folder");
+                               ": was not written by slender_sim, and would be mixed with what is written now; move it "
+                               "away, or name another folder");
     }
     earlier.push_back(entry.path());
   }

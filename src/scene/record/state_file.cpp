@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -138,17 +139,14 @@ bool fits(const SceneState& loaded, const SceneState& now, std::size_t k, const 
 
 std::string misfit(const SceneState& loaded, const SceneState& now, const WorldModel& world)
 {
-  if (loaded.rods.size() != now.rods.size() || loaded.rod_guides.size() != now.rod_guides.size() ||
-      loaded.threads.size() != now.threads.size() || loaded.end_loads.size() != now.end_loads.size() ||
-      loaded.cloths.size() != now.cloths.size() || loaded.cloth_guides.size() != now.cloth_guides.size() ||
-      loaded.cloth_grasps.size() != now.cloth_grasps.size() || loaded.bodies.size() != now.bodies.size() ||
-      loaded.obstacles.size() != now.obstacles.size() ||
-      loaded.obstacle_velocities.size() != now.obstacle_velocities.size() ||
-      loaded.contact.rods.size() != now.contact.rods.size() ||
-      loaded.contact.threads.size() != now.contact.threads.size() ||
-      loaded.contact.bodies.size() != now.contact.bodies.size() ||
-      loaded.contact.cloths.size() != now.contact.cloths.size() ||
-      loaded.grasp_offsets.size() != now.grasp_offsets.size() || loaded.wrenches.size() != now.wrenches.size())
+  const auto sizes = [](const SceneState& s) {
+    return std::array{
+        s.rods.size(),           s.rod_guides.size(),          s.threads.size(),       s.end_loads.size(),
+        s.cloths.size(),         s.cloth_guides.size(),        s.cloth_grasps.size(),  s.bodies.size(),
+        s.obstacles.size(),      s.obstacle_velocities.size(), s.contact.rods.size(),  s.contact.threads.size(),
+        s.contact.bodies.size(), s.contact.cloths.size(),      s.grasp_offsets.size(), s.wrenches.size()};
+  };
+  if (sizes(loaded) != sizes(now))
     return "has another number of rods, threads, cloths, bodies, obstacles or grasps";
   std::string problem;
   for (std::size_t r = 0; problem.empty() && r < now.rods.size(); ++r)

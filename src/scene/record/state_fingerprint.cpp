@@ -20,6 +20,7 @@ public:
   ByteWriter out;
 
 private:
+  void addGrasps(const std::vector<GraspConfig>& grasps);
   void addTracking(const TrackingConfig& tracking);
   void addMaterial(const ClothConfig& config, const ClothModel& model);
 };
@@ -31,6 +32,15 @@ void Fingerprint::addName(const std::string& name)
     out(c);
 }
 
+void Fingerprint::addGrasps(const std::vector<GraspConfig>& grasps)
+{
+  for (const GraspConfig& grasp : grasps)
+  {
+    addName(grasp.name);
+    out(grasp.attach);
+  }
+}
+
 void Fingerprint::addTracking(const TrackingConfig& tracking)
 {
   out(tracking.guide.mesh.vertices);
@@ -38,21 +48,13 @@ void Fingerprint::addTracking(const TrackingConfig& tracking)
   for (const FunctionSet& set : tracking.sets)
   {
     addName(set.name);
-    out(set.from.value_or(0.0));
-    out(set.blend);
-    out(set.bounds);
+    out.all(set.from.value_or(0.0), set.blend, set.bounds);
     for (const WeakConstraints::Matrix* weights : {&set.constraints->matrix(), &set.constraints->guideMatrix()})
     {
       out(static_cast<std::uint64_t>(weights->rows()));
       for (Eigen::Index i = 0; i < weights->rows(); ++i)
-      {
         for (WeakConstraints::Matrix::InnerIterator entry(*weights, i); entry; ++entry)
-        {
-          out(static_cast<int>(i));
-          out(static_cast<int>(entry.col()));
-          out(entry.value());
-        }
-      }
+          out.all(static_cast<int>(i), static_cast<int>(entry.col()), entry.value());
     }
   }
 }
@@ -60,53 +62,25 @@ void Fingerprint::addTracking(const TrackingConfig& tracking)
 void Fingerprint::addTouching(const std::optional<ContactProperties>& contact)
 {
   const ContactProperties touch = contact.value_or(ContactProperties{});
-  out(contact.has_value());
-  out(touch.self);
-  out(touch.others);
-  out(touch.solids);
-  out(touch.friction);
+  out.all(contact.has_value(), touch.self, touch.others, touch.solids, touch.friction);
 }
 
 void Fingerprint::add(const TimeConfig& time)
 {
-  out(time.step);
-  out(static_cast<int>(time.integrator));
-  out(time.spectral_radius);
-  out(time.error_tolerance);
-  out(time.min_step);
-  out(time.newton.tolerance);
-  out(time.newton.max_iterations);
-  out(time.newton.max_cuts);
+  out.all(time.step, time.integrator, time.spectral_radius, time.error_tolerance, time.min_step, time.newton.tolerance,
+          time.newton.max_iterations, time.newton.max_cuts);
 }
 
 void Fingerprint::add(const RodConfig& config, const RodModel& model)
 {
   addName(model.name);
-  out(model.closed);
-  out(model.isotropic);
-  out(model.inextensible);
-  out(static_cast<int>(model.curvature));
-  for (const Eigen::VectorXd* values : {&model.mass, &model.rest_length, &model.stretch_modulus, &model.radius_a,
-                                        &model.radius_b, &model.twist_modulus, &model.rest_twist, &model.drag})
-    out(*values);
-  out(model.bend_modulus);
-  out(model.rest_curvature);
-  out(model.mass_damping);
-  out(model.stiffness_damping);
-  out(model.isotropic);
-  out(model.inextensible);
-  for (const GraspConfig& grasp : config.grasps)
-  {
-    addName(grasp.name);
-    out(static_cast<int>(grasp.attach));
-  }
+  out.all(model.closed, model.isotropic, model.inextensible, model.curvature, model.mass, model.rest_length,
+          model.stretch_modulus, model.radius_a, model.radius_b, model.twist_modulus, model.rest_twist, model.drag,
+          model.bend_modulus, model.rest_curvature, model.mass_damping, model.stiffness_damping, model.isotropic,
+          model.inextensible);
+  addGrasps(config.grasps);
   for (const RodLoadConfig& load : config.loads)
-  {
-    out(load.node);
-    out(load.arc_length);
-    out(load.force);
-    out(load.torque);
-  }
+    out.all(load.node, load.arc_length, load.force, load.torque);
   if (const auto& tracking = config.tracking)
     addTracking(*tracking);
   addTouching(config.contact);
@@ -114,31 +88,25 @@ void Fingerprint::add(const RodConfig& config, const RodModel& model)
 
 void Fingerprint::add(const WorldModel::Thread& thread)
 {
-  const auto& model = thread.model;
-  addName(model->name);
-  for (const double value :
-       {model->density, model->viscosity, model->surface_tension, model->nozzle_diameter, model->feed_length,
-        model->floor.height, model->limits.max_edge_length, model->limits.min_edge_length, model->limits.min_radius,
-        model->limits.edge_grading, model->limits.highest_edge_length, model->limits.max_step})
-    out(value);
-  out(model->floor.present);
-  out(model->floor.friction);
-  out(model->limits.max_deposited);
+  const ThreadModel& model = *thread.model;
+  const auto& floor = model.floor;
+  const auto& limits = model.limits;
+  addName(model.name);
+  out.all(model.density, model.viscosity, model.surface_tension, model.nozzle_diameter, model.feed_length, floor.height,
+          limits.max_edge_length, limits.min_edge_length, limits.min_radius, limits.edge_grading,
+          limits.highest_edge_length, limits.max_step, floor.present, floor.friction, limits.max_deposited);
 }
 
 void Fingerprint::addMaterial(const ClothConfig& config, const ClothModel& model)
 {
-  for (const double value :
-       {model.membrane.c11, model.membrane.c12, model.membrane.c22, model.membrane.c33, model.bending_modulus,
-        model.mass_damping, model.stiffness_damping, model.wind_coefficient, model.aerodynamics.air_density,
-        model.aerodynamics.drag, model.aerodynamics.lift, model.plasticity.yield_curvature, model.plasticity.hardening,
-        model.plasticity.creep_time, config.linear_tolerance})
-    out(value);
-  out(static_cast<int>(model.bending));
+  const auto& [c11, c12, c22, c33] = model.membrane;
+  out.all(c11, c12, c22, c33, model.bending_modulus, model.mass_damping, model.stiffness_damping,
+          model.wind_coefficient, model.aerodynamics.air_density, model.aerodynamics.drag, model.aerodynamics.lift,
+          model.plasticity.yield_curvature, model.plasticity.hardening, model.plasticity.creep_time,
+          config.linear_tolerance, model.bending);
   if (model.bending_poissons_ratio)
     out(*model.bending_poissons_ratio);
-  out(static_cast<int>(config.solver));
-  out(config.one_newton_step);
+  out.all(config.solver, config.one_newton_step);
 }
 
 void Fingerprint::add(const ClothConfig& config, const ClothModel& model)
@@ -149,20 +117,14 @@ void Fingerprint::add(const ClothConfig& config, const ClothModel& model)
   for (Eigen::Index f = 0; f < model.rest.triangles.cols(); ++f)
     for (int corner = 0; corner < 3; ++corner)
       out(model.rest.triangles(corner, f));
-  out(model.mass);
-  out(model.warp);
-  out(model.undeformed);
+  out.all(model.mass, model.warp, model.undeformed);
   addMaterial(config, model);
   if (const auto& tracking = config.tracking)
     addTracking(*tracking);
   addTouching(config.contact);
-  out(config.contact.value_or(ContactProperties{}).thickness);
-  out(static_cast<int>(config.contact.value_or(ContactProperties{}).method));
-  for (const GraspConfig& grasp : config.grasps)
-  {
-    addName(grasp.name);
-    out(static_cast<int>(grasp.attach));
-  }
+  const ContactProperties touch = config.contact.value_or(ContactProperties{});
+  out.all(touch.thickness, touch.method);
+  addGrasps(config.grasps);
   for (const char face : model.clamped_faces)
     out(static_cast<int>(face));
   for (const ClothLoadConfig& load : config.loads)
@@ -195,10 +157,7 @@ std::uint64_t stateFingerprint(const SceneConfig& config, const WorldModel& worl
   for (const BodyConfig& body : config.bodies)
   {
     print.addName(body.name);
-    out(body.motion.has_value());
-    out(body.mass);
-    out(body.inertia);
-    out(static_cast<std::uint64_t>(body.welds.size()));
+    out.all(body.motion.has_value(), body.mass, body.inertia, static_cast<std::uint64_t>(body.welds.size()));
   }
   for (const ObstacleConfig& obstacle : config.obstacles)
     print.addName(obstacle.name);

@@ -13,37 +13,19 @@ constexpr const char* kModes = "statics_modes.csv";
 
 void writeRow(TextFile& file, long step, const StaticsRow& row)
 {
-  file.number(step) << ',';
-  file.number(row.factor) << ',';
-  file.number(row.report.residual) << ',';
-  file.number(row.report.energy) << ',';
-  file.number(row.report.lowest_eigenvalue) << (row.report.stable ? ",1," : ",0,");
-  file.number(row.report.escapes) << ',';
-  file.number(row.displacement);
-  file.endLine();
+  const StepReport& report = row.report;
+  file.row(step, row.factor, report.residual, report.energy, report.lowest_eigenvalue, report.stable ? 1 : 0,
+           report.escapes, row.displacement);
 }
 
 void writeModes(TextFile& file, long step, const StaticsRow& row, const std::vector<std::string>& rods)
 {
   for (std::size_t r = 0; r < row.nodes.size(); ++r)
-  {
     for (Eigen::Index i = 0; i < row.nodes[r].cols(); ++i)
-    {
-      file.number(step) << ',' << rods[r] << ',';
-      file.number(i) << ',';
-      file.vector(row.nodes[r].col(i), ',') << ',';
       if (row.modes[r].cols() > i)
-      {
-        file.vector(row.modes[r].col(i).head<3>(), ',') << ',';
-        file.number(row.modes[r](3, i));
-      }
+        file.row(step, rods[r], i, row.nodes[r].col(i), row.modes[r].col(i).head<3>(), row.modes[r](3, i));
       else
-      {
-        file << ",,,";
-      }
-      file.endLine();
-    }
-  }
+        file.row(step, rods[r], i, row.nodes[r].col(i), "", "", "", "");
 }
 
 }   // namespace
@@ -58,10 +40,8 @@ void writeStatics(const std::string& folder, const StaticsRun& run, const std::v
 {
   clearStatics(folder);
   TextFile rows(folder + "/" + kRows), modes(folder + "/" + kModes);
-  rows << "step,factor,residual,energy [J],lowest eigenvalue [1/s^2],stable,escapes,displacement [m]";
-  rows.endLine();
-  modes << "step,rod,node,x [m],y [m],z [m],mode x,mode y,mode z,mode turn [rad]";
-  modes.endLine();
+  rows.row("step,factor,residual,energy [J],lowest eigenvalue [1/s^2],stable,escapes,displacement [m]");
+  modes.row("step,rod,node,x [m],y [m],z [m],mode x,mode y,mode z,mode turn [rad]");
   long step = 0;
   for (const StaticsRow& row : run.rows)
   {

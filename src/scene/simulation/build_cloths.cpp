@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <stdexcept>
 
+#include "scene/reader/yaml_number.h"
 #include "cloth_grasps.h"
 #include "scene_parts.h"
 #include "slender_sim/energy/plate_bending.h"
@@ -20,12 +19,10 @@ void chooseBending(ClothModel& model, std::vector<std::string>& warnings)
       model.bending_poissons_ratio || restsFlat(model))
     return;
   model.bending = BendingModel::hinge;
-  char angle[32];
-  std::snprintf(angle, sizeof angle, "%.3g", largestRestAngle(model) * 180 / M_PI);
-  warnings.push_back(
-      "cloth " + model.name + ": its shape at rest is curved (adjacent faces enclose up to " + angle +
-      " degrees), so it bends by hinges; "
-      "the isometric model is for flat shapes at rest. Give bending: {model: hinge} to choose that yourself.");
+  warnings.push_back("cloth " + model.name + ": its shape at rest is curved (adjacent faces enclose up to " +
+                     shortNumber(largestRestAngle(model) * 180 / M_PI, 3) +
+                     " degrees), so it bends by hinges; the isometric model is for flat shapes at rest. Give bending: "
+                     "{model: hinge} to choose that yourself.");
 }
 
 /// Bending with a Poisson's ratio of its own is exact on meshes of parallelograms only.
@@ -38,10 +35,9 @@ void checkPlate(const ClothModel& model, std::vector<std::string>& warnings)
   const double excess = plateStiffening(model.rest, model.topology, *model.bending_poissons_ratio) - 1.0;
   if (excess > kNoticeable)
   {
-    char percent[32];
-    std::snprintf(percent, sizeof percent, "%.0f", 100 * excess);
     warnings.push_back("cloth " + model.name +
-                       ": with bending: {poissons_ratio} this mesh resists some curvatures by up to " + percent +
+                       ": with bending: {poissons_ratio} this mesh resists some curvatures by up to " +
+                       std::to_string(std::lround(100 * excess)) +
                        " % more than the modulus says. Use a grid with pattern: equilateral or one_diagonal, or leave "
                        "poissons_ratio out.");
   }
@@ -167,18 +163,10 @@ void checkContact(SceneConfig& scene, const WorldModel& model)
 
 void buildCloths(SceneConfig& scene, SceneParts& parts)
 {
-  for (int k = 0; k < static_cast<int>(scene.cloths.size()); ++k)
-  {
-    try
-    {
-      addCloth(scene, k, parts);
-    }
-    catch (const std::invalid_argument& error)
-    {
-      throw SceneError(placeOf(scene, FailurePlace::Kind::cloth, k) + ": " + error.what());
-    }
+  buildEach(scene, FailurePlace::Kind::cloth, scene.cloths.size(), [&](int k) {
+    addCloth(scene, k, parts);
     parts.inputs.cloths.push_back(loadsOf(scene, scene.cloths[k]));
-  }
+  });
   checkContact(scene, parts.model);
 }
 

@@ -1,13 +1,11 @@
 // Rods of a scene.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 
 #include "island/average_projection.h"
 #include "scene_parts.h"
 #include "scene_rod.h"
-#include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/shapes.h"
 
 namespace slender {
@@ -22,11 +20,9 @@ void turnGrasp(GraspConfig& grasp, const Pose& section, SceneConfig& scene)
   const double turn = orientGrasp(grasp, section);
   if (turn > kNoticeable && !scene.start.equilibrium)
   {
-    char degrees[32];
-    std::snprintf(degrees, sizeof degrees, "%.0f", turn * 180 / M_PI);
     scene.warnings.push_back(
         (scene.file.empty() ? "scene " + scene.name : scene.file) + ": grasp " + grasp.name +
-        ": direction or director turns the section by " + degrees +
+        ": direction or director turns the section by " + std::to_string(std::lround(turn * 180 / M_PI)) +
         " degrees within the first step; start: equilibrium turns it slowly, before the first step");
   }
 }
@@ -41,25 +37,20 @@ bool holdsTangent(const RodConfig& rod, const RodModel& model, int edge)
   return held(edge) && held((edge + 1) % model.nodes());
 }
 
-bool carries(const BodyConfig& body, int rod)
-{
-  return std::any_of(body.welds.begin(), body.welds.end(), [rod](const WeldConfig& weld) { return weld.rod == rod; });
-}
-
 /// The loads that act all the time.
 RodInputs loadsOf(SceneConfig& scene, int r, const RodModel& model)
 {
   const RodConfig& rod = scene.rods[r];
-  RodLoads loads = rodLoads(rod, model, scene.time.integrator);
-  const auto carriesIt = [r](const BodyConfig& body) { return carries(body, r); };
+  RodInputs loads = rodLoads(rod, model, scene.time.integrator);
+  loads.gravity = scene.gravity;
+  const auto carries = [r](const BodyConfig& body) { return body.isWeldedTo(r); };
   const auto clamps = [](const GraspConfig& grasp) { return grasp.hold == Hold::frame; };
   if (loads.torques.size() > 0 && std::none_of(rod.grasps.begin(), rod.grasps.end(), clamps) &&
-      std::none_of(scene.bodies.begin(), scene.bodies.end(), carriesIt))
+      std::none_of(scene.bodies.begin(), scene.bodies.end(), carries))
   {
     throw std::invalid_argument(
         "loads: nothing balances the torque, since no grasp holds a frame of the rod (hold: frame) and no body is "
-        "welded to it: "
-        "its material frames, which have no inertia, would spin without end");
+        "welded to it: its material frames, which have no inertia, would spin without end");
   }
   for (int j = 0; j < static_cast<int>(loads.torques.size()); ++j)
   {
@@ -68,17 +59,12 @@ RodInputs loadsOf(SceneConfig& scene, int r, const RodModel& model)
       scene.warnings.push_back((rod.place.empty() ? "rod " + rod.name : rod.place) +
                                ": a torque of loads goes along with the tangent of edge " + std::to_string(j) +
                                ", which may turn. Such a torque has no potential: statics finds its equilibria, but "
-                               "stability and the lowest eigenvalue "
-                               "leave out that it turns, and a rod that they call stable may flutter. Hold the nodes "
-                               "of this edge by hold: position to guide it");
+                               "stability and the lowest eigenvalue leave out that it turns, and a rod that they call "
+                               "stable may flutter. Hold the nodes of this edge by hold: position to guide it");
       break;
     }
   }
-  RodInputs inputs;
-  inputs.gravity = scene.gravity;
-  inputs.forces = std::move(loads.forces);
-  inputs.torques = std::move(loads.torques);
-  return inputs;
+  return loads;
 }
 
 /// Where the scene starts the averages are the guide's, and their velocities: by the least change of the nodes that no
@@ -165,17 +151,7 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
 
 void buildRods(SceneConfig& scene, SceneParts& parts)
 {
-  for (int r = 0; r < static_cast<int>(scene.rods.size()); ++r)
-  {
-    try
-    {
-      addRod(scene, r, parts);
-    }
-    catch (const std::invalid_argument& error)
-    {
-      throw SceneError(placeOf(scene, FailurePlace::Kind::rod, r) + ": " + error.what());
-    }
-  }
+  buildEach(scene, FailurePlace::Kind::rod, scene.rods.size(), [&](int r) { addRod(scene, r, parts); });
 }
 
 }   // namespace slender

@@ -1,9 +1,7 @@
 #include <algorithm>
-#include <stdexcept>
 
 #include "scene_parts.h"
 #include "slender_sim/geometry/rotation.h"
-#include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/shapes.h"
 
 namespace slender {
@@ -85,28 +83,20 @@ ThreadState stateOf(const ThreadConfig& config, const ThreadModel& model, const 
 
 void buildThreads(const SceneConfig& scene, SceneParts& parts)
 {
-  for (std::size_t k = 0; k < scene.threads.size(); ++k)
-  {
+  buildEach(scene, FailurePlace::Kind::thread, scene.threads.size(), [&](int k) {
     const ThreadConfig& config = scene.threads[k];
-    try
-    {
-      WorldModel::Thread thread;
-      thread.model = std::make_shared<const ThreadModel>(modelOf(config));
-      checkThreadModel(*thread.model);   // before its state is made
-      thread.contact = config.contact;
-      thread.merging = config.merging;
-      ThreadGroupState state;
-      state.threads.push_back(stateOf(config, *thread.model, scene.gravity));
-      state.start_volume = state.volumeBalance();
-      parts.model.threads.push_back(std::move(thread));
-      parts.state.threads.push_back(std::move(state));
-      parts.state.end_loads.emplace_back();
-    }
-    catch (const std::invalid_argument& error)
-    {
-      throw SceneError(placeOf(scene, FailurePlace::Kind::thread, static_cast<int>(k)) + ": " + error.what());
-    }
-  }
+    WorldModel::Thread thread;
+    thread.model = std::make_shared<const ThreadModel>(modelOf(config));
+    checkThreadModel(*thread.model);   // before its state is made
+    thread.contact = config.contact;
+    thread.merging = config.merging;
+    ThreadGroupState state;
+    state.threads.push_back(stateOf(config, *thread.model, scene.gravity));
+    state.start_volume = state.volumeBalance();
+    parts.model.threads.push_back(std::move(thread));
+    parts.state.threads.push_back(std::move(state));
+    parts.state.end_loads.emplace_back();
+  });
   parts.inputs.threads.resize(scene.threads.size());
 }
 

@@ -19,11 +19,6 @@ std::string timeOf(const Simulation& simulation)
   return text;
 }
 
-bool welds(const BodyConfig& body, int rod)
-{
-  return std::any_of(body.welds.begin(), body.welds.end(), [rod](const WeldConfig& weld) { return weld.rod == rod; });
-}
-
 }   // namespace
 
 CrossingWatch::CrossingWatch(const Simulation& simulation) : simulation_(simulation)
@@ -52,7 +47,7 @@ CrossingWatch::CrossingWatch(const Simulation& simulation) : simulation_(simulat
       const Object &first = objects_[a], &second = objects_[b];
       const bool cloths = first.kind == Kind::cloth && second.kind == Kind::cloth;
       if (!cloths &&
-          !(first.kind == Kind::rod && second.kind == Kind::body && welds(scene.bodies[second.index], first.index)))
+          !(first.kind == Kind::rod && second.kind == Kind::body && scene.bodies[second.index].isWeldedTo(first.index)))
         pairs_.push_back({a, b});
     }
   const WorldModel& model = simulation.world().model();
@@ -80,7 +75,7 @@ void CrossingWatch::pairHeld(Kind kind, int index, double reach, const std::vect
   pair.obstacle = -1;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
     if (const BodyConfig& body = scene.bodies[b];
-        body.motion && body.shape && body.contact && !(kind == Kind::rod && welds(body, index)))
+        body.motion && body.shape && body.contact && !(kind == Kind::rod && body.isWeldedTo(index)))
     {
       pair.body = static_cast<int>(b);
       pair.radius = boundingRadius(*body.shape);

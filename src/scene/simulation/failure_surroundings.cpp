@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
+#include "scene/reader/yaml_number.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/contact/solids.h"
 
@@ -29,11 +29,7 @@ struct Nearest
   }
   std::string text(const std::string& what) const
   {
-    if (name.empty())
-      return "";
-    char away[40];
-    std::snprintf(away, sizeof away, "%.3g", distance);
-    return "; the nearest " + what + " is " + name + ", " + away + " m away";
+    return name.empty() ? "" : "; the nearest " + what + " is " + name + ", " + shortNumber(distance, 3) + " m away";
   }
 };
 
@@ -157,10 +153,7 @@ private:
     const double radius = largestRadius(model, std::min(place_.node, model.edges() - 1));
     if (contact->solids)
     {
-      addSolids(radius, [this](const BodyConfig& body) {
-        return std::none_of(body.welds.begin(), body.welds.end(),
-                            [this](const WeldConfig& weld) { return weld.rod == object_; });
-      });
+      addSolids(radius, [this](const BodyConfig& body) { return !body.isWeldedTo(object_); });
     }
     for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
     {

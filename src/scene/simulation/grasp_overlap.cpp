@@ -1,10 +1,10 @@
 #include "slender_sim/scene/grasp_overlap.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 #include <vector>
 
+#include "scene/reader/yaml_number.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/geometry/pose_motion.h"
 
@@ -108,12 +108,9 @@ private:
     const double thickness = a.radius + b.radius, distance = distanceOf(a.shape, b.shape);
     if (distance >= thickness + simulation_.config().contact.gap)
       return "";
-    char text[240];
-    std::snprintf(text, sizeof text,
-                  " overlap: the sections that they hold come within %.3g m of each other, and their radii add up to "
-                  "%.3g m. Keep the grippers farther apart",
-                  distance, thickness);
-    return names(a, b) + text;
+    return names(a, b) + " overlap: the sections that they hold come within " + shortNumber(distance, 3) +
+           " m of each other, and their radii add up to " + shortNumber(thickness, 3) +
+           " m. Keep the grippers farther apart";
   }
 
   std::string betweenNeighbours(const HeldPart& low, const HeldPart& high) const
@@ -124,12 +121,9 @@ private:
                  distance = (low.nodes.back() - high.nodes.front()).norm();
     if (distance >= kLeastRoom * length)
       return "";
-    char text[240];
-    std::snprintf(text, sizeof text,
-                  " overlap: they come within %.3g m of each other, with %.3g m of the rod between them. Keep the "
-                  "grippers farther apart, or let one of them hold fewer nodes",
-                  distance, length);
-    return names(low, high) + text;
+    return names(low, high) + " overlap: they come within " + shortNumber(distance, 3) + " m of each other, with " +
+           shortNumber(length, 3) +
+           " m of the rod between them. Keep the grippers farther apart, or let one of them hold fewer nodes";
   }
 
   std::string names(const HeldPart& a, const HeldPart& b) const

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
+
+#include "scene/reader/yaml_number.h"
 
 namespace slender {
 
@@ -50,21 +51,20 @@ double defaultStrainLimit(const RodConfig& rod)
   return modulus >= kStiffModulus ? kStiffStrain : kSoftStrain;
 }
 
+/// The largest strain of so many edges, and the edge that has it. stretch(edge): its length over that at rest.
+template <class Stretch>
+std::pair<double, std::size_t> largestStrain(std::size_t edges, const Stretch& stretch)
+{
+  std::pair<double, std::size_t> worst{0.0, 0};
+  for (std::size_t e = 0; e < edges; ++e)
+    if (const double strain = std::abs(stretch(e) - 1.0); strain > worst.first)
+      worst = {strain, e};
+  return worst;
+}
+
 const Pose& nozzlePose(const ThreadGroupState& group) { return group.threads.front().ends[1].X_WE; }
 
 }   // namespace
-
-const char* toString(OnLimit on_limit)
-{
-  switch (on_limit)
-  {
-    case OnLimit::warn: return "warn";
-    case OnLimit::hold: return "hold";
-    case OnLimit::release: return "release";
-    case OnLimit::stop: return "stop";
-  }
-  return "?";
-}
 
 LimitWatch::LimitWatch(Simulation& simulation) : simulation_(simulation), limits_(simulation.config().limits)
 {
@@ -106,10 +106,9 @@ void LimitWatch::look(const Key& key, double value, double limit, const std::str
   if (found != excursions_.end() && (limits_.on_limit != OnLimit::release || now < found->second.next_action))
     return;
   Excursion& excursion = excursions_[key];
-  char text[160];
-  std::snprintf(text, sizeof text, " %.4g%s exceeds limits.%s = %.4g%s (t = %.6g s)", value, unit, limitName(key.first),
-                limit, unit, now);
-  excursion.worst = {key.first, now, value, limit, std::move(to_release), subject + text};
+  const std::string text = subject + " " + shortNumber(value, 4) + unit + " exceeds limits." + limitName(key.first) +
+                           " = " + shortNumber(limit, 4) + unit + " (t = " + shortNumber(now, 6) + " s)";
+  excursion.worst = {key.first, now, value, limit, std::move(to_release), text};
   act(excursion);
   if (found != excursions_.end())
     return;   // the same excursion goes on
@@ -246,18 +245,10 @@ void LimitWatch::checkRodStrain(int rod, std::vector<LimitExcess>& begun)
   const double limit = rod_strain_limits_[static_cast<std::size_t>(rod)];
   const RodModel& model = simulation_.rodModel(rod);
   const Eigen::Matrix3Xd& x = simulation_.state().rods[rod].x;
-  double strain = 0.0;
-  int worst = 0;
-  for (int j = 0; j < model.edges(); ++j)
-  {
-    const int next = j + 1 < x.cols() ? j + 1 : 0;
-    const double here = std::abs((x.col(next) - x.col(j)).norm() / model.rest_length[j] - 1.0);
-    if (here > strain)
-    {
-      strain = here;
-      worst = j;
-    }
-  }
+  const auto [strain, worst] = largestStrain(static_cast<std::size_t>(model.edges()), [&](std::size_t j) {
+    const auto edge = static_cast<Eigen::Index>(j);
+    return (x.col((edge + 1) % x.cols()) - x.col(edge)).norm() / model.rest_length[edge];
+  });
   if (isQuiet({LimitKind::strain, rod}, strain, limit))
     return;
   look({LimitKind::strain, rod}, strain, limit,
@@ -268,18 +259,9 @@ void LimitWatch::checkClothStrain(int cloth, std::vector<LimitExcess>& begun)
 {
   const Eigen::Matrix3Xd& x = simulation_.state().cloths[cloth].x;
   const auto& edges = cloth_edges_[cloth];
-  double strain = 0.0;
-  std::size_t worst = 0;
-  for (std::size_t e = 0; e < edges.size(); ++e)
-  {
-    const double here =
-        std::abs((x.col(edges[e].second) - x.col(edges[e].first)).norm() / cloth_lengths_[cloth][e] - 1.0);
-    if (here > strain)
-    {
-      strain = here;
-      worst = e;
-    }
-  }
+  const auto [strain, worst] = largestStrain(edges.size(), [&](std::size_t e) {
+    return (x.col(edges[e].second) - x.col(edges[e].first)).norm() / cloth_lengths_[cloth][e];
+  });
   const int rods = static_cast<int>(simulation_.config().rods.size());
   if (isQuiet({LimitKind::strain, rods + cloth}, strain, cloth_strain_limit_))
     return;

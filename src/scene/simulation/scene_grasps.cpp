@@ -11,8 +11,6 @@ namespace slender {
 
 namespace {
 
-Pose sectionOffset(const Pose& X_WM, const Pose& X_WG) { return X_WM.inverse() * X_WG; }
-
 bool isIdentity(const Pose& X)
 {
   return X.position == Eigen::Vector3d::Zero() && X.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs();
@@ -92,7 +90,7 @@ GraspTarget SceneGrasps::targetOf(int grasp, const Pose& X_WM, const std::option
 void SceneGrasps::setOffset(int grasp, const Pose& X_WM)
 {
   check(grasp);
-  state_.grasp_offsets[grasp] = sectionOffset(X_WM, pose(grasp));
+  state_.grasp_offsets[grasp] = X_WM.inverse() * pose(grasp);
 }
 
 GraspTarget SceneGrasps::drivenTarget(int grasp, const SceneInputs& inputs) const

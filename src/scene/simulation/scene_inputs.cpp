@@ -32,24 +32,20 @@ void addThreads(const SceneConfig& config, const SceneState& state, double time,
 
 void addGuides(const SceneConfig& config, const SceneState& state, double time, SceneInputs& inputs)
 {
-  inputs.guides.resize(state.cloth_guides.size());
-  for (std::size_t k = 0; k < inputs.guides.size(); ++k)
-  {
-    const auto& tracking = config.cloths[k].tracking;
-    if (tracking && !tracking->guide.byTopic() && !std::holds_alternative<ClothGuide>(tracking->guide.motion))
-      tracking->guide.evaluate(time, inputs.guides[k]);
-    else
-      inputs.guides[k] = state.cloth_guides[k].points;
-  }
-  inputs.rod_guides.resize(state.rod_guides.size());
-  for (std::size_t r = 0; r < inputs.rod_guides.size(); ++r)
-  {
-    const auto& tracking = config.rods[r].tracking;
-    if (tracking && !tracking->guide.byTopic())
-      tracking->guide.evaluate(time, inputs.rod_guides[r]);
-    else
-      inputs.rod_guides[r] = state.rod_guides[r].points;
-  }
+  const auto add = [time](const auto& objects, const std::vector<GuideState>& guides,
+                          std::vector<Eigen::Matrix3Xd>& points) {
+    points.resize(guides.size());
+    for (std::size_t k = 0; k < guides.size(); ++k)
+    {
+      const auto& tracking = objects[k].tracking;
+      if (tracking && !tracking->guide.byTopic() && !std::holds_alternative<ClothGuide>(tracking->guide.motion))
+        tracking->guide.evaluate(time, points[k]);
+      else
+        points[k] = guides[k].points;
+    }
+  };
+  add(config.cloths, state.cloth_guides, inputs.guides);
+  add(config.rods, state.rod_guides, inputs.rod_guides);
 }
 
 /// `name`: of the list of inputs; `parts`, `points`: what the entries are for, and what they consist of.

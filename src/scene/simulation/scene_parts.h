@@ -1,8 +1,10 @@
 #pragma once
 
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/scene_state.h"
 #include "slender_sim/world/world.h"
 
@@ -29,5 +31,23 @@ void buildBodies(const SceneConfig& scene, SceneParts& parts);
 
 /// Where a part is in the scene's file, for messages; kind none: the file.
 std::string placeOf(const SceneConfig& scene, FailurePlace::Kind kind, int index);
+
+/// Calls build(index) for each of `count` parts of a kind. Where that throws std::invalid_argument, throws SceneError
+/// with the place of the part.
+template <class Build>
+void buildEach(const SceneConfig& scene, FailurePlace::Kind kind, std::size_t count, const Build& build)
+{
+  for (int k = 0; k < static_cast<int>(count); ++k)
+  {
+    try
+    {
+      build(k);
+    }
+    catch (const std::invalid_argument& error)
+    {
+      throw SceneError(placeOf(scene, kind, k) + ": " + error.what());
+    }
+  }
+}
 
 }   // namespace slender

@@ -84,8 +84,7 @@ void setNaturalFrames(const RodConfig& rod, SceneRod& built)
   {
     throw std::invalid_argument(
         "the axes of its sections do not meet where the loop is closed; initial_twist and rest_twist of a closed rod "
-        "that bends "
-        "differently in different directions must add up to a multiple of 2 pi, got " +
+        "that bends differently in different directions must add up to a multiple of 2 pi, got " +
         std::to_string(total));
   }
   if (!rod.rest_twist.empty() || offset != 0.0)
@@ -143,8 +142,8 @@ void chooseFormulation(const RodConfig& rod, bool explicit_steps, RodModel& mode
   if (rod.stretching == Stretching::projected && !explicit_steps)
   {
     throw std::invalid_argument(
-        "stretching: projected takes explicit steps (time.integrator: symplectic_euler); "
-        "with implicit ones take stretching: stiff and material.inextensible: true");
+        "stretching: projected takes explicit steps (time.integrator: symplectic_euler); with implicit ones take "
+        "stretching: stiff and material.inextensible: true");
   }
   model.isotropic = rod.formulation != Formulation::general && obstacle.empty();
   model.inextensible = rod.stretching == Stretching::projected;
@@ -192,8 +191,7 @@ void checkTorque(const RodConfig& rod, Integrator integrator)
   {
     throw std::invalid_argument(
         "loads: a torque is not for time.integrator implicit_midpoint and generalized_alpha, whose check of the energy "
-        "does not "
-        "know its work; take tr_bdf2, bdf2, implicit_euler or symplectic_euler");
+        "does not know its work; take tr_bdf2, bdf2, implicit_euler or symplectic_euler");
   }
   if (rod.tracking)
     throw std::invalid_argument("loads: a torque is not for rods that track a guide; leave torque out");
@@ -222,9 +220,9 @@ SceneRod buildSceneRod(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const
   return built;
 }
 
-RodLoads rodLoads(const RodConfig& rod, const RodModel& model, Integrator integrator)
+RodInputs rodLoads(const RodConfig& rod, const RodModel& model, Integrator integrator)
 {
-  RodLoads loads;
+  RodInputs loads;
   if (rod.loads.empty())
     return loads;
   const int n = model.nodes(), edges = model.edges();

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "slender_sim/dynamics/time_config.h"
-#include "slender_sim/rod/rod_model.h"
+#include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/config.h"
 
 /// From a rod of a scene to its model and its first state. Both throw std::invalid_argument with name, value and range.
@@ -18,16 +18,9 @@ struct SceneRod
 SceneRod buildSceneRod(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity,
                        Integrator integrator);
 
-/// Dead loads of a rod as RodInputs has them; both are empty where the scene gives none.
-struct RodLoads
-{
-  Eigen::Matrix3Xd forces;   ///< per node [N]
-  Eigen::VectorXd torques;   ///< about the tangent of each edge [N m]
-};
-
-/// Spreads the point loads of a rod over its nodes and edges. Each of the two edges at an inner node bears half of a
-/// torque there.
-RodLoads rodLoads(const RodConfig& rod, const RodModel& model, Integrator integrator);
+/// Spreads the point loads of a rod over the forces on its nodes and the torques on its edges; both are empty where the
+/// scene gives none. Each of the two edges at an inner node bears half of a torque there.
+RodInputs rodLoads(const RodConfig& rod, const RodModel& model, Integrator integrator);
 
 /// Gives a clamped section the orientation of `direction` and `director` in place of that of its motion's poses. What
 /// is left out of the two stays as it is at the start, at `section`: the tangent, or the first material axis, carried

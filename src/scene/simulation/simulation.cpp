@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
+#include "scene/reader/yaml_number.h"
 #include "scene_inputs.h"
 #include "scene_parts.h"
 #include "slender_sim/scene/failure_surroundings.h"
@@ -90,11 +90,7 @@ Simulation::Simulation(SceneConfig config, const Simulation& running) : config_(
     SceneGrasps grasps(config_, start.model(), initial_, parts.grasps);
     transfer.attachNew(grasps, initial_.time);
   }
-  catch (const std::invalid_argument& error)   // includes WorldError
-  {
-    reset_problem_ = error.what();
-  }
-  catch (const SceneError& error)
+  catch (const std::exception& error)   // WorldError, SceneError, or std::invalid_argument of a grasp
   {
     reset_problem_ = error.what();
   }
@@ -197,17 +193,15 @@ void Simulation::findEquilibrium()
   }
   if (!report.stable)
   {
-    char eigenvalue[40];
-    std::snprintf(eigenvalue, sizeof eigenvalue, "%.6g", report.lowest_eigenvalue);
-    const std::string unstable = std::string("start: equilibrium: the equilibrium is unstable (lowest eigenvalue ") +
-                                 eigenvalue + " 1/s^2), and no stable one was reached from it";
+    const std::string unstable = "start: equilibrium: the equilibrium is unstable (lowest eigenvalue " +
+                                 shortNumber(report.lowest_eigenvalue, 6) +
+                                 " 1/s^2), and no stable one was reached from it";
     if (!config_.start.accept_unstable)
     {
-      throw SimulationError(
-          unstable +
-          ": start from a shape that is nearer to the stable equilibrium (initial), or hold what drifts by a grasp "
-          "(start: as_given starts from the shape in the scene; start: {equilibrium: true, accept_unstable: true} "
-          "starts from the unstable equilibrium)");
+      throw SimulationError(unstable +
+                            ": start from a shape that is nearer to the stable equilibrium (initial), or hold what "
+                            "drifts by a grasp (start: as_given starts from the shape in the scene; start: "
+                            "{equilibrium: true, accept_unstable: true} starts from the unstable equilibrium)");
     }
     config_.warnings.push_back(unstable + ": start.accept_unstable starts from it all the same");
   }

@@ -1,9 +1,9 @@
 #include "state_transfer.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <stdexcept>
 
+#include "scene/reader/yaml_number.h"
 #include "scene/record/state_fit.h"
 #include "cloth_grasps.h"
 #include "slender_sim/scene/reader.h"
@@ -12,17 +12,21 @@ namespace slender {
 
 namespace {
 
+/// Returns the index of the first entry that `fits`, or -1.
+template <class Entry, class Fits>
+int indexWhere(const std::vector<Entry>& entries, const Fits& fits)
+{
+  const auto found = std::find_if(entries.begin(), entries.end(), fits);
+  return found == entries.end() ? -1 : static_cast<int>(found - entries.begin());
+}
+
 /// Returns, for each entry of `to`, the index of the entry of `from` with the same name, or -1.
 template <class Named>
 std::vector<int> sameNames(const std::vector<Named>& from, const std::vector<Named>& to)
 {
   std::vector<int> same;
   for (const Named& one : to)
-  {
-    const auto found =
-        std::find_if(from.begin(), from.end(), [&](const Named& other) { return other.name == one.name; });
-    same.push_back(found == from.end() ? -1 : static_cast<int>(found - from.begin()));
-  }
+    same.push_back(indexWhere(from, [&](const Named& other) { return other.name == one.name; }));
   return same;
 }
 
@@ -70,23 +74,17 @@ StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before,
   obstacles_ = sameNames(from.obstacles, to.obstacles);
   for (const GraspRef& grasp : now_)
   {
-    const auto same = [&](const GraspRef& other) {
+    grasps_.push_back(indexWhere(before_, [&](const GraspRef& other) {
       const bool held = grasp.cloth >= 0 ? other.cloth >= 0 && other.cloth == cloths_[grasp.cloth]
                                          : other.cloth < 0 && other.rod == rods_[grasp.rod];
       return held && other.config->name == grasp.config->name;
-    };
-    const auto found = std::find_if(before_.begin(), before_.end(), same);
-    grasps_.push_back(found == before_.end() ? -1 : static_cast<int>(found - before_.begin()));
+    }));
   }
   const std::vector<BodyWeld> welds_before = weldsOf(from);
   for (const BodyWeld& weld : weldsOf(to))
-  {
-    const auto same = [&](const BodyWeld& other) {
+    welds_.push_back(indexWhere(welds_before, [&](const BodyWeld& other) {
       return other.body == bodies_[weld.body] && other.index == weld.index;
-    };
-    const auto found = std::find_if(welds_before.begin(), welds_before.end(), same);
-    welds_.push_back(found == welds_before.end() ? -1 : static_cast<int>(found - welds_before.begin()));
-  }
+    }));
 }
 
 bool StateTransfer::ownerStays(const GraspRef& grasp) const
@@ -105,9 +103,7 @@ void StateTransfer::checkTables(double time) const
     if ((first.position - now.position).norm() <= kSame &&
         1.0 - std::abs(first.orientation.dot(now.orientation)) <= kSame)
       return;
-    char text[40];
-    std::snprintf(text, sizeof text, "%.6g", time);
-    throw SceneError(what + ": times of tables are those of the scene, which is at t = " + text +
+    throw SceneError(what + ": times of tables are those of the scene, which is at t = " + shortNumber(time, 6) +
                      " s: there the table has left its first pose already; let it begin later");
   };
   for (std::size_t b = 0; b < bodies_.size(); ++b)
@@ -155,22 +151,15 @@ void StateTransfer::takeGrasps(const SceneState& before, SceneState& state) cons
     if (!ownerStays(ref))
       continue;
     const GraspRef* old = isNew(grasps_[g]) ? nullptr : &before_[static_cast<std::size_t>(grasps_[g])];
-    if (ref.cloth >= 0)
-    {
-      ClothGrasp& grasp = state.cloth_grasps[ref.cloth][ref.index];
+    const auto grasp_of = [](auto& of, const GraspRef& r) { return &of.rods[r.rod].grasps[r.index]; };
+    const auto cloth_grasp_of = [](auto& of, const GraspRef& r) { return &of.cloth_grasps[r.cloth][r.index]; };
+    const auto take = [&](const auto& find) {
       if (old)
-        grasp = before.cloth_grasps[old->cloth][old->index];
+        *find(state, ref) = *find(before, *old);
       else
-        grasp.active = false;
-    }
-    else
-    {
-      GraspState& grasp = state.rods[ref.rod].grasps[ref.index];
-      if (old)
-        grasp = before.rods[old->rod].grasps[old->index];
-      else
-        grasp.active = false;
-    }
+        find(state, ref)->active = false;
+    };
+    ref.cloth >= 0 ? take(cloth_grasp_of) : take(grasp_of);
   }
   takeEntries(grasps_, before.grasp_offsets, state.grasp_offsets);
   takeEntries(grasps_, before.wrenches, state.wrenches);
@@ -258,16 +247,15 @@ void StateTransfer::takeContacts(const std::vector<int>& same, const std::vector
       continue;
     const std::vector<ContactRange> found = to[k].ranges;
     to[k] = from[static_cast<std::size_t>(same[k])];
-    std::vector<ContactSpring>& springs = to[k].springs;
-    springs.erase(
-        std::remove_if(springs.begin(), springs.end(), [&](auto& spring) { return !renumber(spring.partner); }),
-        springs.end());
-    std::vector<ContactRange>& ranges = to[k].ranges;
-    ranges.erase(std::remove_if(ranges.begin(), ranges.end(), [&](auto& range) { return !renumber(range.partner); }),
-                 ranges.end());
+    const auto keep = [&](auto& list) {
+      const auto gone = [&](auto& entry) { return !renumber(entry.partner); };
+      list.erase(std::remove_if(list.begin(), list.end(), gone), list.end());
+    };
+    keep(to[k].springs);
+    keep(to[k].ranges);
     for (const ContactRange& range : found)
       if (isNew(mapOf(range.partner)[static_cast<std::size_t>(range.partner.index)]))
-        ranges.push_back(range);
+        to[k].ranges.push_back(range);
   }
 }
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "scene/reader/yaml_number.h"
 #include "scene_parts.h"
 #include "slender_sim/rod/rod_path.h"
 #include "slender_sim/scene/reader.h"
@@ -13,12 +13,7 @@ namespace slender {
 
 namespace {
 
-std::string shortText(double value)
-{
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
+std::string atFactor(double factor) { return "load factor " + shortNumber(factor, 6) + ": "; }
 
 double largestDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b)
 {
@@ -193,10 +188,9 @@ void StaticsRunner::perturb(double first_factor, StaticsRun& run)
   const double size = mode.colwise().norm().sum();
   if (!(size > 0))
   {
-    fail(run,
-         "statics.perturbation: the lowest mode of the first equilibrium moves no node, so that no force lies along "
-         "it; leave perturbation out");
-    return;
+    return fail(run,
+                "statics.perturbation: the lowest mode of the first equilibrium moves no node, so that no force lies "
+                "along it; leave perturbation out");
   }
   imperfection_ =
       config_.statics->perturbation * sumOfLoads(*world_.model().rods[0].model, loadsPerFactor(0, 1.0)) / size * mode;
@@ -210,7 +204,7 @@ void StaticsRunner::runFactors(const std::vector<double>& factors, StaticsRun& r
     if (!report.ok)
     {
       run.end = report;
-      run.end.message = "load factor " + shortText(factor) + ": " + report.message;
+      run.end.message = atFactor(factor) + report.message;
       return;
     }
     run.rows.push_back(rowAt(factor, report));
@@ -227,7 +221,7 @@ void StaticsRunner::runPath(const PathConfig& path, StaticsRun& run)
   if (!first.ok)
   {
     run.end = first;
-    run.end.message = "load factor " + shortText(path.from) + ": " + first.message;
+    run.end.message = atFactor(path.from) + first.message;
     return;
   }
   run.rows.push_back(rowAt(path.from, first));
@@ -237,12 +231,9 @@ void StaticsRunner::runPath(const PathConfig& path, StaticsRun& run)
     const StepReport moved = walk.advance(1.0 / path.steps);
     if (moved.ok && walk.factor() > 1.0)
       walk.settleAt(1.0);   // where that fails, the path ends just beyond
-    if (!moved.ok)
-    {
-      fail(run, "load factor " + shortText(path.from + walk.factor() * range) + ": " + moved.message);
-      return;
-    }
     const double factor = path.from + walk.factor() * range;
+    if (!moved.ok)
+      return fail(run, atFactor(factor) + moved.message);
     state = walk.state();
     StepReport report = stepper.assessEquilibrium(state, loadsAt(0, factor));
     report.iterations = moved.iterations;
@@ -251,8 +242,8 @@ void StaticsRunner::runPath(const PathConfig& path, StaticsRun& run)
       return;
   }
   fail(run, "statics.path: the path has become " + std::to_string(kMostTimes) +
-                " times as long as its scale without reaching factor " + shortText(path.to) + "; it ends at factor " +
-                shortText(run.rows.back().factor));
+                " times as long as its scale without reaching factor " + shortNumber(path.to, 6) +
+                "; it ends at factor " + shortNumber(run.rows.back().factor, 6));
 }
 
 /// Follows the path from factor 0 until its equilibria are unstable, or the factor turns back; then bisects.
@@ -267,9 +258,8 @@ void StaticsRunner::findCritical(double up_to, StaticsRun& run)
   const StepReport first = stepper.solveEquilibrium(safe, loadsAt(0, 0.0), false);
   if (!first.ok || !first.stable)
   {
-    fail(run, "statics.buckling: " + (first.ok ? std::string("the equilibrium without the load (factor 0) is unstable")
-                                               : "load factor 0: " + first.message));
-    return;
+    return fail(run, "statics.buckling: " + (first.ok ? "the equilibrium without the load (factor 0) is unstable"
+                                                      : atFactor(0) + first.message));
   }
   const RodInputs unit = loadsPerFactor(0, 1.0);
   const double length = model.rest_length.sum(),
@@ -282,9 +272,9 @@ void StaticsRunner::findCritical(double up_to, StaticsRun& run)
     const StepReport moved = walk.advance(share);
     if (!moved.ok || low >= up_to || k == kMostSteps)
     {
-      fail(run, "statics.buckling: " + (moved.ok ? "no critical load was found up to factor " + shortText(low)
-                                                 : "load factor " + shortText(low) + ": " + moved.message));
-      return;
+      return fail(run,
+                  "statics.buckling: " + (moved.ok ? "no critical load was found up to factor " + shortNumber(low, 6)
+                                                   : atFactor(low) + moved.message));
     }
     high = walk.factor();
     if (high <= low || !stepper.assessEquilibrium(walk.state(), loadsAt(0, high)).stable)
