@@ -56,8 +56,8 @@ double ContactPotential::Impl::frictionOf(const Contact& contact) const
 }
 
 /// Finds how friction turns the curves of a contact: with the lever from the centreline to where the force acts. On a
-/// solid and between two curves that is the surface of the curve. On cloth it is the middle surface, so that both pieces
-/// get opposite moments.
+/// solid and between two curves that is the surface of the curve. On cloth it is the middle surface, so that both
+/// pieces get opposite moments.
 void ContactPotential::Impl::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
 {
   const bool turns[2] = {surface.objects[contact.object].turns,

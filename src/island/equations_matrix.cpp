@@ -9,8 +9,8 @@ namespace slender {
 
 void Equations::makeRoom(const ContactTerm& term)
 {
-  const Key key{term.point[0],   term.point[1],      term.point[2],     term.point[3],
-                term.solid, term.turn[0].point, term.turn[1].point};
+  const Key key{term.point[0], term.point[1],      term.point[2],     term.point[3],
+                term.solid,    term.turn[0].point, term.turn[1].point};
   const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
   if (at != keys_.end() && *at == key)
     return;

@@ -49,8 +49,8 @@ void RodStepper::Impl::beginSpinStage(std::size_t s, double h)
   const double inertia = 1.0 / (stage.tau_a * stage.tau_a), damping = model->mass_damping / stage.tau_v;
   for (int j = 0; j < model->edges(); ++j)
   {
-    const double target = (inertia * combineTurn(stage.q_hat, j) + damping * combineTurn(stage.q_tilde, j)) /
-                          (inertia + damping);
+    const double target =
+        (inertia * combineTurn(stage.q_hat, j) + damping * combineTurn(stage.q_tilde, j)) / (inertia + damping);
     system.setSpin(j, model->spin_inertia[j] * (inertia + damping), target);
     system.setTurn(j, s == 0 ? stage.time * h * work.spin[j] : (1 - plan->stages[0].time) * h * stage_spin[j]);
   }

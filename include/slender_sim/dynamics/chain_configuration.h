@@ -31,8 +31,8 @@ public:
 
   bool isFree(int node) const { return holds_.isFree(node); }
   bool mayTurn(int edge) const { return holds_.mayTurn(edge); }   ///< its angle is not prescribed
-  /// By how much an edge has turned about its tangent since forgetTurns(), at the trial [rad]. Without keepTurns() it is
-  /// the turn since the base.
+  /// By how much an edge has turned about its tangent since forgetTurns(), at the trial [rad]. Without keepTurns() it
+  /// is the turn since the base.
   double turn(int edge) const { return (turned_.empty() ? 0.0 : turned_[edge]) + a_.turn[edge]; }
   /// Whether an unknown is prescribed, or does not exist: the last node of an open chain has no edge.
   bool held(int unknown) const

@@ -133,9 +133,9 @@ struct Fields<GraspState>
 template <>
 struct Fields<RodState>
   : Members<&RodState::x, &RodState::v, &RodState::d1, &RodState::twist, &RodState::director, &RodState::spin,
-            &RodState::grasps,
-            &RodState::last_step, &RodState::next_step, &RodState::a, &RodState::x_previous, &RodState::v_previous,
-            &RodState::spin_rate, &RodState::spin_previous, &RodState::turn_previous, &RodState::strain_rate, &RodState::strain_rate_previous, &RodState::strain_previous>
+            &RodState::grasps, &RodState::last_step, &RodState::next_step, &RodState::a, &RodState::x_previous,
+            &RodState::v_previous, &RodState::spin_rate, &RodState::spin_previous, &RodState::turn_previous,
+            &RodState::strain_rate, &RodState::strain_rate_previous, &RodState::strain_previous>
 {
 };
 
