@@ -51,9 +51,11 @@ void cut(GroupSetup& g, int rod)
   auto open = std::make_shared<RodModel>(*g.model.rods[rod].model);
   const int edges = open->edges() - 1;
   open->closed = false;
-  for (Eigen::VectorXd* perEdge : {&open->rest_length, &open->stretch_modulus, &open->radius_a, &open->radius_b})
-    perEdge->conservativeResize(edges);
   RodState& state = g.state.rods[rod];
+  for (Eigen::VectorXd* perEdge :
+       {&open->rest_length, &open->spin_inertia, &open->stretch_modulus, &open->radius_a, &open->radius_b, &state.spin})
+    if (perEdge->size() > 0)
+      perEdge->conservativeResize(edges);
   state.d1.conservativeResize(3, edges);
   state.twist[0] = state.twist[edges] = 0;
   state.forgetHistory();
