@@ -167,7 +167,7 @@ private:
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;
-  std::vector<int> segment_of_point_;   ///< that begins at a point, or ends there if none begins; -1: none
+  std::vector<int> segment_of_point_;   ///< begins at a point, or ends there if none begins; -1: none
   double margin_;
   std::vector<int> order_;   ///< for clearance()
   std::vector<BoundingBox> boxes_;

@@ -55,9 +55,9 @@ double ContactPotential::Impl::frictionOf(const Contact& contact) const
   return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
-/// Finds how friction turns the curves of a contact: with the lever from the centreline to where the force acts. On a
-/// solid and between two curves that is the surface of the curve. On cloth it is the middle surface, so that both
-/// pieces get opposite moments.
+/// Finds how friction turns the curves of a contact. The lever reaches from the centreline to the place where the force
+/// acts. If a curve touches a solid or another curve, that place is on the surface of the curve. If it touches a cloth,
+/// the place is on the middle surface of the cloth, so that the moments on both are opposite.
 void ContactPotential::Impl::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
 {
   const bool turns[2] = {surface.objects[contact.object].turns,

@@ -51,8 +51,9 @@ public:
   /// Number of the first of a point's three unknowns in the matrix, or kPrescribed. Less than kPrescribed: its
   /// displacement depends on other unknowns, see addColumns().
   virtual int base(int) const { return kPrescribed; }
-  /// Writes the turns about their tangents of the segments that begin at its surface points into `turns`, likewise:
-  /// from the start of the substep to the trial [rad].
+  /// Writes for each surface point by how much the segment that begins there has turned about its tangent, from the
+  /// start of the substep to the trial [rad]. The entries of the part begin at first_point. Without segments that turn
+  /// nothing is written.
   virtual void gatherTurns(Eigen::VectorXd&) const {}
   /// Adds a weighted component of the displacement of a point to a row of unknowns. Component 3 of a curve is the turn
   /// of the segment that begins there.
@@ -62,10 +63,10 @@ public:
       row.push(first + component, weight);
   }
   virtual void addForce(int, const Eigen::Vector3d&) {}   ///< gradient -= force
-  virtual void addTorque(int, double) {}                  ///< likewise, on the turn of a segment [N m]
+  virtual void addTorque(int, double) {}                  ///< gradient -= torque, of a segment [N m]
   /// Displacement of a point by the direction [m].
   virtual Eigen::Vector3d move(int) const { return Eigen::Vector3d::Zero(); }
-  virtual double moveTurn(int) const { return 0.0; }   ///< likewise of the turn of a segment [rad]
+  virtual double moveTurn(int) const { return 0.0; }   ///< Turn of a segment by the direction [rad].
 };
 
 /// A part of an island: something with unknowns of its own. A rod, a thread, a cloth, and a rigid body are parts.

@@ -53,8 +53,8 @@ public:
   void addSurface(ContactSurface& surface) const override;
 
 private:
-  /// Friction turns the rod about its tangents. Methods whose stage lies inside a step relax the frames at its end,
-  /// which leaves no spins.
+  /// Whether friction turns the rod about its tangents. It does not with methods whose stage lies inside the step,
+  /// because these relax the frames at the end of the step, which removes spins.
   bool turns() const
   {
     const Integrator integrator = rod_.time.integrator;

@@ -1,5 +1,5 @@
-// Edges that turn about their tangents with inertia, in the implicit substeps of one rod. Frames of other rods are in
-// equilibrium at every instant (thesis 4.3).
+// Here the edges of a rod get inertia about their tangents in implicit substeps. Rods that friction does not turn have
+// no such inertia: their frames are in equilibrium at every instant (thesis 4.3).
 #include "rod_stepper_impl.h"
 
 namespace slender {
@@ -7,10 +7,10 @@ namespace slender {
 void RodStepper::Impl::keepSpins()
 {
   spins = true;
-  system.keepSpins(true);
+  system.keepSpins();
 }
 
-/// As combine(), of the turn of an edge since the substep began.
+/// Does what combine() does for positions, for the turn of an edge since the substep began.
 double RodStepper::Impl::combineTurn(const Combination& c, int j) const
 {
   double sum = c[kV] * work.spin[j];
@@ -23,7 +23,7 @@ double RodStepper::Impl::combineTurn(const Combination& c, int j) const
   return sum;
 }
 
-/// What the state does not know yet is zero.
+/// Completes the state: spins and memory of spins that it does not have yet are zero.
 void RodStepper::Impl::beginSpins()
 {
   const bool multistep = work.x_previous.cols() > 0, accelerated = work.a.cols() > 0;

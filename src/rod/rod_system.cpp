@@ -77,9 +77,9 @@ void RodSystem::setTwistLoads(const Eigen::VectorXd& torques)
   listTerms();
 }
 
-void RodSystem::keepSpins(bool keep)
+void RodSystem::keepSpins()
 {
-  spins_ = keep;
+  spins_ = true;
   spin_inertia_.resize(a_.edges);
   listTerms();
 }

@@ -357,7 +357,7 @@ TEST_F(TrackedFunctions, SayWhatIsWrong)
   };
   for (const auto& c : cases)
   {
-    // which contact a cloth may have depends on its functions, also where they are wrong
+    // The functions of a cloth decide which contact it may have. The reader asks them even if they are wrong.
     for (const std::string& text : {problems({c.set}), problems({c.set, "tracked.0.contact={}"})})
       EXPECT_NE(text.find(c.expected), std::string::npos) << c.set << "\n -> " << text;
   }

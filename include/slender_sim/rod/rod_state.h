@@ -49,7 +49,8 @@ struct RodState
   double next_step = 0.0;                    ///< [s] where the error control left off, 0 = nowhere
   Eigen::Matrix3Xd a;                        ///< accelerations
   Eigen::Matrix3Xd x_previous, v_previous;   ///< multistep methods
-  /// The same of spins: angular accelerations; spins one step ago, and the turns since then [rad].
+  /// Integrator memory of the spins: angular accelerations [rad/s^2]; for multistep methods the spins one step ago
+  /// [rad/s], and by how much each edge has turned since then [rad].
   Eigen::VectorXd spin_rate, spin_previous, turn_previous;
   /// With Rayleigh stiffness damping only: per node, then two per grasp, (stretch of the edge after the node, kappa1,
   /// kappa2, twist).

@@ -41,10 +41,11 @@ public:
   /// tangents that is exact. Where a tangent turns as well, such a torque has no potential: its force field is M_j on
   /// theta_j and nothing on positions, and the matrix leaves out its skew part.
   void setTwistLoads(const Eigen::VectorXd& torques);
-  /// Whether edges have inertia about their tangents; from load() on it is zero.
-  void keepSpins(bool keep);
+  /// From now on edges may have inertia about their tangents. load() sets it to zero, and setSpin() sets it for an
+  /// edge, see SpinInertia.
+  void keepSpins();
   void setSpin(int edge, double weight, double target) { spin_inertia_.set(edge, weight, target); }
-  /// Trial turn of an edge from the base; nothing happens where it is prescribed [rad].
+  /// Sets by how much an edge turns from the base to the trial [rad]. If the turn is prescribed, it stays as it is.
   void setTurn(int edge, double turn);
   /// Work of these torques on the way from the state of load() to the trial [J].
   double twistWork() const;

@@ -25,7 +25,7 @@ struct Roller
   double friction;
 };
 
-/// The slope is the floor, and gravity is inclined. The curve lies along y, a third of the gap above the floor.
+/// The floor is level and gravity is inclined instead. The curve lies along y, a third of the gap above the floor.
 Simulation onSlope(const Roller& roller)
 {
   constexpr double kGap = 0.0001;
