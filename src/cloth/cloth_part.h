@@ -78,6 +78,7 @@ private:
   bool joined() const override { return averages_ != nullptr; }
   AverageConstraints* averages() override { return averages_; }
   void meetAverages() override;
+  void addTriples(std::vector<char>& turns) const override { turns.insert(turns.end(), unknowns_ / 3, 0); }
   bool numberUnknowns() override;
   int unknowns() const override { return unknowns_; }
   void moveAlong(double alpha) override;

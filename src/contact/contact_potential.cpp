@@ -182,9 +182,7 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
     energy += addSheets(x, poses, with_stiffness);
   if (!std::isfinite(energy))
     return restart();
-  for (Contact& contact : lagged)
-    energy += addFriction(x, poses, turns, contact, with_stiffness);
-  return energy;
+  return energy + addFriction(x, poses, turns, with_stiffness);
 }
 
 double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness)
@@ -356,6 +354,7 @@ double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<
 void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h)
 {
   impl_->lagged.clear();
+  impl_->beginFollowing();
   impl_->x_begin = x;
   impl_->solids_begin = solids;
   impl_->h = h;
@@ -372,6 +371,7 @@ void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose
 }
 
 double ContactPotential::lagFriction() { return impl_->lagFriction(); }
+void ContactPotential::followFriction(bool on) { impl_->following = on; }
 const std::vector<FrictionSpring>& ContactPotential::springs() const { return impl_->springs; }
 void ContactPotential::setSprings(const std::vector<FrictionSpring>& springs) { impl_->springs = springs; }
 void ContactPotential::keepSprings(const std::vector<Pose>& solids) { impl_->keepSprings(solids); }
@@ -433,6 +433,7 @@ void ContactPotential::adaptStiffness()
 
 void ContactPotential::beginSolution()
 {
+  impl_->following = false;
   for (BarrierStiffness& own : impl_->stiffness)
     own.beginSolution();
 }

@@ -56,7 +56,8 @@ public:
                    const std::vector<Pose>& solids_end);
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns);
-  double lagFriction();
+  void beginFollowing();
+  double lagFriction(double least = 0.0);
   void keepSprings(const std::vector<Pose>& poses);
   void letPass(const SurfaceMotion& motion);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
@@ -78,6 +79,7 @@ public:
   std::vector<ContactTerm> terms;
   std::vector<ContactRow> rows;
   double largest_force = 0.0, smallest_gap = 0.0;
+  bool following = false;   ///< see followFriction()
 
 private:
   double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
@@ -113,6 +115,8 @@ private:
   FrictionSpring springOf(const Contact& contact) const;
   bool turnsWithSolid(const Contact& contact) const;
   double spin(const Contact& contact, const std::vector<Pose>& poses) const;
+  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
+                     bool with_stiffness);
   double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
                      Contact& contact, bool with_stiffness);
   double restart();
@@ -164,6 +168,8 @@ private:
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
+  int follows_left_ = 0;   ///< how often friction may follow before the next begin()
+  double shift_ = 0.0;     ///< of the potential, so that it has not jumped where friction followed [J]
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;

@@ -15,8 +15,11 @@ double closestOnSegment(const Eigen::Vector3d& p, const Eigen::Vector3d& a, cons
   return along < e2 ? along / e2 : 1.0;
 }
 
-SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
-                              const Eigen::Vector3d& b1)
+namespace {
+
+/// For all segments, in particular those that are nearly parallel or have no extent.
+SegmentPair closestOfAnySegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                                 const Eigen::Vector3d& b1)
 {
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0, w = b0 - a0, c = e.cross(f);
   const double c2 = c.squaredNorm(), parallel = 1e-6 * e.squaredNorm() * f.squaredNorm();
@@ -44,6 +47,27 @@ SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& 
   consider(closestOnSegment(b0, a0, a1), 0.0);
   consider(closestOnSegment(b1, a0, a1), 1.0);
   return best;
+}
+
+}   // namespace
+
+SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
+                              const Eigen::Vector3d& b1)
+{
+  constexpr double kParallel = 1e-2;   // of the product of the squared lengths; then two digits are lost
+  const Eigen::Vector3d e = a1 - a0, f = b1 - b0, w = b0 - a0;
+  const double ee = e.squaredNorm(), ff = f.squaredNorm(), ef = e.dot(f), ew = e.dot(w), fw = f.dot(w);
+  const double both = ee * ff - ef * ef;
+  if (!(both > kParallel * ee * ff))
+    return closestOfAnySegments(a0, a1, b0, b1);
+  // Where the lines are nearest, then the nearest t for that s, and the nearest s if t is at an end [Ericson,
+  // Real-Time Collision Detection, 5.1.9].
+  const double s = std::clamp((ew * ff - fw * ef) / both, 0.0, 1.0), t = (ef * s - fw) / ff;
+  if (t < 0.0)
+    return {std::clamp(ew / ee, 0.0, 1.0), 0.0};
+  if (t > 1.0)
+    return {std::clamp((ew + ef) / ee, 0.0, 1.0), 1.0};
+  return {s, t};
 }
 
 Eigen::Vector3d closestOnTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,

@@ -144,7 +144,36 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   return most * law.energy(y);
 }
 
-double ContactPotential::Impl::lagFriction()
+void ContactPotential::Impl::beginFollowing()
+{
+  constexpr int kMostFollows = 5;   // where contacts stick and slip by turns they would never end
+  following = false;
+  follows_left_ = kMostFollows;
+}
+
+/// Friction of all contacts, from normal forces of an earlier configuration or, if friction follows, of this one.
+double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
+                                           const Eigen::VectorXd* turns, bool with_stiffness)
+{
+  const auto sum = [&](bool stiffness) {
+    double energy = 0.0;
+    for (Contact& contact : lagged)
+      energy += addFriction(x, poses, turns, contact, stiffness);
+    return energy;
+  };
+  if (!following || !with_stiffness || follows_left_ == 0)
+    return sum(with_stiffness) + shift_;
+  const std::size_t others = terms.size();
+  const double before = sum(false) + shift_;
+  terms.resize(others);
+  if (lagFriction(kLagTolerance) > kLagTolerance)
+    --follows_left_;
+  shift_ = before - sum(true);
+  return before;
+}
+
+/// Changes of at most `least` are not taken over.
+double ContactPotential::Impl::lagFriction(double least)
 {
   const auto comes_before = [](const Contact& a, const Contact& b) {
     return a.first != b.first ? a.first < b.first : a.second < b.second;
@@ -185,8 +214,11 @@ double ContactPotential::Impl::lagFriction()
     change = std::max(change, old->force.norm());
   for (const Contact& contact : lagged)
     largest = std::max(largest, contact.force.norm());
-  lagged.swap(rubbing_);
-  return largest > 0.0 ? change / largest : 0.0;
+  const double share = largest > 0.0 ? change / largest : 0.0;
+  shift_ = 0.0;
+  if (share >= least)
+    lagged.swap(rubbing_);
+  return share;
 }
 
 /// The spring of a contact, without its tension.

@@ -33,7 +33,6 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
 {
   constexpr int kMaxApproaches = 200, kMaxIdle = 10, kQuickAdvances = 3, kMaxSolutions = 24, kMaxFailures = 8;
   constexpr double kLeastAdvance = 1e-3, kFarAdvance = 0.2;   // of the way; less than the least is none
-  constexpr double kLagTolerance = 1e-2;
   NewtonResult total;
   const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
     system.resolve(config.tolerance, gap_tolerance);
@@ -99,7 +98,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     const bool changed = system.contact()->stiffen(good);
     if (!good && !(changed && ++failures <= kMaxFailures))
       return total;
-    if (good && !changed && (system.contact()->lagFriction() < kLagTolerance || k >= kMaxSolutions))
+    if (good && !changed && (system.contact()->lagFriction() <= ContactPotential::kLagTolerance || k >= kMaxSolutions))
       return total;
     system.accept();
   }

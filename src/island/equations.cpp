@@ -258,12 +258,22 @@ double Equations::stepLimit()
 
 double Equations::incrementSize() const
 {
+  constexpr double kStick = 0.3;   // of the range in which friction sticks; the increment after is far smaller
   double largest = 0.0;
   for (const Part* part : parts_)
     largest = std::max(largest, part->incrementSize(tolerances.least_edge));
   if (!contact_)
     return largest;
-  constexpr double kStick = 0.3;   // of the range in which friction sticks; the increment after is far smaller
+  // A barrier is resolved when its gaps are, and friction that sticks when the stretch of its springs is.
+  if (moved_at_contact_ > 0.0)
+    largest = std::max(largest, tolerance_ * moved_at_contact_ / (gap_tolerance_ * contact_->smallestGap()));
+  return std::max(largest, tolerance_ * moved_sticking_ / kStick);
+}
+
+/// How far the direction moves touching surfaces against each other. Once that is little, friction follows.
+void Equations::measureContacts()
+{
+  constexpr double kLittle = 0.1;   // of the smallest gap
   double at_contact = 0.0, sticking = 0.0;
   for (const ContactTerm& term : contact_->terms())
   {
@@ -280,10 +290,9 @@ double Equations::incrementSize() const
     if (term.slip_range > 0.0)
       sticking = std::max(sticking, u.norm() / term.slip_range);
   }
-  // A barrier is resolved when its gaps are, and friction that sticks when the stretch of its springs is.
-  if (at_contact > 0.0)
-    largest = std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_->smallestGap()));
-  return std::max(largest, tolerance_ * sticking / kStick);
+  moved_at_contact_ = at_contact;
+  moved_sticking_ = sticking;
+  contact_->followFriction(at_contact < kLittle * contact_->smallestGap());
 }
 
 double Equations::slope() const

@@ -112,6 +112,7 @@ private:
   void restoreBase();
   double stepLimit();
   double incrementSize() const;
+  void measureContacts();
   bool anglesMayKeepShift() const { return tolerances.angles_may_keep_shift; }
   double mostUnbalanced() const { return tolerances.most_unbalanced; }
   StepFailure givesUp() const;
@@ -150,6 +151,7 @@ private:
   void buildPattern();
   std::vector<int> numberBlocks();
   SharedMatrix::Solver chooseSolver();
+  bool sweepsPay();
   SharedMatrix::Bases basesOf(const int (&point)[4]) const;
   std::array<int, 2> turnsOf(const ContactTerm& term) const;
   bool needsRows(const SharedMatrix::Bases& bases, int solid) const;
@@ -158,6 +160,7 @@ private:
   void addForce(const ContactTerm& term);
   void assemble(const HessianShift& shift, bool whole);
   bool factor(const HessianShift& shift);
+  void takeGradients();
   bool anyAverages() const;
   void keepAverages();
   void follow();
@@ -175,6 +178,7 @@ private:
   int linear_iterations_ = 0;
   int blocks_ = 0;                         ///< of the matrix
   std::vector<std::pair<int, int>> met_;   ///< blocks of which parts touch each other
+  std::vector<char> turns_of_triples_;     ///< see Part::addTriples()
   std::vector<Key> keys_, keys_before_;    ///< room for contacts that the pattern has, sorted
 
   std::unique_ptr<ContactPotential> contact_;
@@ -189,6 +193,9 @@ private:
   bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
+  /// Largest motion of surfaces against each other by the direction: where they touch [m], and where friction sticks,
+  /// over the stretch at which it slips [-].
+  double moved_at_contact_ = 0, moved_sticking_ = 0;
 };
 
 }   // namespace slender

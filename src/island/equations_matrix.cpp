@@ -177,7 +177,7 @@ void Equations::buildPattern()
     matrix_.noteRows(rows.data(), 3);
   }
   const std::vector<int> blocks = numberBlocks();
-  matrix_.finish(blocks, chooseSolver());
+  matrix_.finish(chooseSolver(), blocks, turns_of_triples_);
   pattern_valid_ = true;
   for (Part* part : parts_)
     if (part->coupled)
@@ -220,9 +220,26 @@ SharedMatrix::Solver Equations::chooseSolver()
   constexpr int kPairsPerBlock = 2, kLeastUnknowns = 40'000;
   if (anyAverages())   // the Schur complement needs many exact solutions
     return SharedMatrix::Solver::cholesky;
+  if (sweepsPay())
+    return SharedMatrix::Solver::sweeps;
   const bool loops = static_cast<int>(met_.size()) >= kPairsPerBlock * blocks_;
   return loops && matrix_.unknowns() >= kLeastUnknowns ? SharedMatrix::Solver::conjugate_gradients
                                                        : SharedMatrix::Solver::cholesky;
+}
+
+/// Sweeps over points solve the equations of cloth faster than factors, whatever the size. Rods are too stiff for them,
+/// and so are piles of bodies. Small matrices are solved to round-off, because that costs little.
+bool Equations::sweepsPay()
+{
+  constexpr int kLeastUnknowns = 300, kTriplesPerBody = 30;
+  turns_of_triples_.clear();
+  for (const Part* part : parts_)
+    if (part->coupled)
+      part->addTriples(turns_of_triples_);
+  const auto triples = static_cast<int>(turns_of_triples_.size());
+  const auto bodies = static_cast<int>(std::count(turns_of_triples_.begin(), turns_of_triples_.end(), 1));
+  return 3 * triples == matrix_.unknowns() && matrix_.unknowns() >= kLeastUnknowns &&
+         triples >= kTriplesPerBody * bodies;
 }
 
 // ---- the matrix
@@ -267,6 +284,7 @@ void Equations::assemble(const HessianShift& shift, bool whole)
 
 bool Equations::factor(const HessianShift& shift)
 {
+  takeGradients();   // sweeps solve at once
   const auto assembled = [&](bool whole) { assemble(shift, whole); };
   return exact_ ? matrix_.factorExactly(assembled) : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
 }
@@ -314,19 +332,24 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   });
   for (Part* part : parts_)
     part->passGradient();
-  if (with_hessian && matrix_.unknowns() > 0)
-    sum.inertia.negative += !factor(shift);
   for (Part* part : parts_)
     if (part->coupled)
       part->closeGradient();
+  if (with_hessian && matrix_.unknowns() > 0)
+    sum.inertia.negative += !factor(shift);
   return sum;
 }
 
-void Equations::solve()
+void Equations::takeGradients()
 {
   for (const Part* part : parts_)
     if (part->coupled)
       part->takeGradient(matrix_.solution());
+}
+
+void Equations::solve()
+{
+  takeGradients();
   const bool solved = matrix_.solve();
   linear_iterations_ += matrix_.linearIterations();
   if (!solved)
@@ -342,6 +365,8 @@ void Equations::solve()
       part.solve();
   });
   spread();
+  if (contact_)
+    measureContacts();
 }
 
 bool Equations::anyAverages() const

@@ -56,7 +56,7 @@ void SharedMatrix::noteBases(const Bases& bases)
             note(bases[i] + r, bases[j] + c);
 }
 
-void SharedMatrix::finish(const std::vector<int>& blocks, Solver solver)
+void SharedMatrix::finish(Solver solver, const std::vector<int>& blocks, const std::vector<char>& turns)
 {
   solver_ = solver;
   cholesky_known_ = false;
@@ -74,6 +74,8 @@ void SharedMatrix::finish(const std::vector<int>& blocks, Solver solver)
   values_.assign(rows_.size(), 0.0);
   if (solver_ == Solver::conjugate_gradients)
     takeBlocks(blocks);
+  if (solver_ == Solver::sweeps)
+    sweeps_.setPattern(starts_, rows_, turns);
 }
 
 /// The pattern of the blocks stays when contacts between blocks come and go. Then its analysis stays, too.
@@ -113,7 +115,28 @@ int SharedMatrix::index(int a, int b) const
 
 // ---- solutions
 
-bool SharedMatrix::factorPresent() { return solver_ == Solver::cholesky ? factorDirectly() : factorBlocks(); }
+bool SharedMatrix::factorPresent()
+{
+  return solver_ == Solver::cholesky ? factorDirectly() : solver_ == Solver::sweeps ? sweep() : factorBlocks();
+}
+
+bool SharedMatrix::sweep()
+{
+  // Newton's method takes as many iterations as with exact solutions. More iterations than the most would cost more
+  // than a factorisation.
+  constexpr double kTolerance = 1e-4;
+  constexpr int kMostIterations = 250;
+  if (unknowns_ == 0 || !swept_.due())
+    return factorDirectly();
+  direct_ = false;
+  const LinearResult result = sweeps_.solve(values_, solution_, kTolerance, kMostIterations);
+  iterations_ = result.iterations;
+  if (!result.definite)
+    return false;
+  const bool solved = result.residual <= kTolerance;
+  swept_.tried(solved);
+  return solved || factorDirectly();
+}
 
 bool SharedMatrix::factorDirectly()
 {
@@ -142,12 +165,17 @@ bool SharedMatrix::factorBlocks()
 
 bool SharedMatrix::solve()
 {
-  iterations_ = 0;
   if (unknowns_ == 0)
     return true;
   if (direct_)
   {
+    iterations_ = 0;
     cholesky_->solve(solution_.data());
+    return true;
+  }
+  if (solver_ == Solver::sweeps)
+  {
+    sweeps_.copySolution(solution_.data());
     return true;
   }
   constexpr double kTolerance = 1e-9;   // Newton's method then converges as with a direct solution

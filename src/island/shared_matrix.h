@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "island/point_sweeps.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
@@ -17,14 +18,17 @@ namespace slender {
 /// matrix: factor() with a function that calls clear() and adds all entries.
 ///
 /// The matrix is solved by sparse Cholesky factorisation, or by conjugate gradients. These are preconditioned by the
-/// factorisation of blocks: the matrix without what couples unknowns of different blocks.
+/// factorisation of blocks, which are the matrix without what couples unknowns of different blocks, or by sweeps over
+/// points of three unknowns each. Sweeps solve in factor(), because only then it is known whether the matrix is
+/// positive definite: the right-hand side must be in solution() before.
 class SharedMatrix
 {
 public:
   enum class Solver
   {
     cholesky,
-    conjugate_gradients
+    conjugate_gradients,
+    sweeps
   };
 
   /// A row of unknowns with weights: what one component of a displacement depends on.
@@ -53,8 +57,10 @@ public:
   /// Everything that these rows contain together.
   void noteRows(const Columns* rows, int count);
   void noteBases(const Bases& bases);
-  /// `blocks`: the number of the block that each unknown belongs to; only conjugate gradients need it.
-  void finish(const std::vector<int>& blocks = {}, Solver solver = Solver::cholesky);
+  /// `blocks`: the number of the block that each unknown belongs to; only conjugate gradients need it. `turns`: only
+  /// for sweeps, see PointSweeps.
+  void finish(Solver solver = Solver::cholesky, const std::vector<int>& blocks = {},
+              const std::vector<char>& turns = {});
   int unknowns() const { return unknowns_; }
   Solver solver() const { return solver_; }
   /// Where an entry of the pattern lies among values().
@@ -76,8 +82,8 @@ public:
   void addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns);
   void addRow(const ContactRow& row, const Bases& bases, bool whole);
 
-  /// Forgets the failures of factorisations with whole second derivatives.
-  void beginStage() { whole_ = {}; }
+  /// Forgets the failures of factorisations with whole second derivatives, and those of sweeps.
+  void beginStage() { whole_ = swept_ = {}; }
   /// Factors what assemble(whole) makes: with the contacts' whole second derivatives where `contacts` says that there
   /// are any, that is due and leaves the matrix positive definite; else without those parts of them that may be
   /// negative. Returns whether the matrix is positive definite. With conjugate gradients, only the blocks are
@@ -137,9 +143,13 @@ private:
   void takeBlocks(const std::vector<int>& blocks);
   bool factorPresent();
   bool factorBlocks();
+  bool sweep();
   void multiply(const std::vector<double>& x, std::vector<double>& y) const;
 
-  WholeStiffness whole_;
+  /// Factorisations with whole second derivatives: Newton's method wants them where curves run along each other, but
+  /// they may leave the matrix indefinite.
+  Backoff whole_;
+  Backoff swept_;   ///< sweeps that take too many iterations
   int unknowns_ = 0;
   std::vector<std::vector<int>> columns_;
   std::vector<int> starts_, rows_;   ///< lower triangle by columns, as SparseCholesky has it
@@ -152,6 +162,7 @@ private:
   bool cholesky_known_ = false;              ///< has the present pattern
   bool direct_ = true;                       ///< the last factorisation is that of the whole matrix
 
+  PointSweeps sweeps_;
   std::optional<SparseCholesky> block_cholesky_;
   std::vector<int> block_entries_;               ///< places in values_ of the entries of blocks
   std::vector<int> block_starts_, block_rows_;   ///< pattern of the blocks

@@ -30,6 +30,13 @@ BlockMatrix::BlockMatrix(int points, const std::vector<Eigen::MatrixXi>& element
   values_.assign(9 * rows_.size() + 4, 0.0);
 }
 
+BlockMatrix::BlockMatrix(std::vector<int> starts, std::vector<int> rows)
+  : starts_(std::move(starts)),
+    rows_(std::move(rows))
+{
+  values_.assign(9 * rows_.size() + 4, 0.0);
+}
+
 int BlockMatrix::block(int a, int b) const
 {
   const int column = std::min(a, b), row = std::max(a, b);

@@ -43,10 +43,11 @@ SymmetricSweeps::SymmetricSweeps(const BlockMatrix& a, const PointMatrix* b) : a
   }
 }
 
-void SymmetricSweeps::set(double factor, const std::vector<char>& held)
+void SymmetricSweeps::set(double factor, const std::vector<char>& held, const std::vector<char>* apart)
 {
   factor_ = factor;
   held_ = &held;
+  apart_ = apart;
   for (int i = 0; i < a_->points(); ++i)
   {
     Eigen::Matrix3d d = Eigen::Matrix3d::Zero(), inverse = d;
@@ -76,22 +77,21 @@ void SymmetricSweeps::set(double factor, const std::vector<char>& held)
 
 void SymmetricSweeps::setWhole()
 {
-  const std::vector<char>& held = *held_;
   Eigen::Matrix3d whole = Eigen::Matrix3d::Zero();
   for (int j = 0; j < a_->points(); ++j)
   {
-    if (held[j])
+    if (!moves(j))
       continue;
     for (int k = a_->starts()[j]; k < a_->starts()[j + 1]; ++k)
     {
       const Eigen::Map<const Eigen::Matrix3d> block(a_->values() + 9 * static_cast<std::size_t>(k));
       if (a_->rows()[k] == j)
         whole += block;
-      else if (!held[a_->rows()[k]])
+      else if (moves(a_->rows()[k]))
         whole += block + block.transpose();
     }
     for (int k = b_ ? b_->starts()[j] : 0; k < (b_ ? b_->starts()[j + 1] : 0); ++k)
-      if (!held[b_->column(k)])
+      if (moves(b_->column(k)))
         whole.diagonal().array() += factor_ * b_->values()[k];
   }
   whole_.compute(whole);
@@ -116,10 +116,11 @@ void SymmetricSweeps::translate(const PointVector& forces, PointVector& x) const
     return;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int j = 0; j < a_->points(); ++j)
-    sum += point(forces, j);
+    if (moves(j))
+      sum += point(forces, j);
   const Eigen::Vector3d motion = whole_.solve(sum);
   for (int j = 0; j < a_->points(); ++j)
-    if (!(*held_)[j])
+    if (moves(j))
       point(x, j) += motion;
 }
 

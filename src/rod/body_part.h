@@ -62,6 +62,7 @@ public:
 
 private:
   // ---- as RigidPart
+  void addTriples(std::vector<char>& turns) const override { turns.insert(turns.end(), {0, 1}); }
   bool numberUnknowns() override { return true; }   // they never change
   int unknowns() const override { return 6; }
   bool joined() const override { return !carried_.empty(); }

@@ -295,6 +295,44 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
 
+/// Friction that follows has the normal forces of the present configuration. The potential is the one whose slope these
+/// forces are, and has not jumped.
+TEST(ContactFriction, FollowsNormalForces)
+{
+  constexpr double kStep = 0.01, kFriction = 0.4;
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, kFriction);
+  surface.solids.push_back({Plane{}, kFriction, {}});
+  const std::vector<Pose> solids(1);
+  const Eigen::Vector3d side(0.6, 0.8, 0), down(0, 0, -1);
+  ContactPotential potential(surface, gapOptions());
+  potential.setStiffness(2.0);
+  potential.begin(x, solids, kStep);
+  const double full = gapOptions().slip_speed * kStep;
+  const auto at = [&](double deep) { return Eigen::Matrix3Xd(x.colwise() + (20 * full * side + deep * down)); };
+  const auto friction = [&] { return potential.terms().back().force.norm() / potential.terms()[0].force.norm(); };
+
+  const double before = potential.evaluate(at(0.002), solids, true);
+  EXPECT_LT(friction(), 0.9 * kFriction);   // of a smaller normal force
+  potential.followFriction(true);
+  EXPECT_NEAR(potential.evaluate(at(0.002), solids, true), before, 1e-14 * std::abs(before));
+  EXPECT_NEAR(friction(), kFriction, 1e-9 * kFriction);
+  const double force = potential.terms().back().force.norm(), h = 1e-3 * full;
+  const Eigen::Matrix3Xd there = at(0.002).colwise() + h * side, back = at(0.002).colwise() - h * side;
+  EXPECT_NEAR(potential.evaluate(there, solids, false) - potential.evaluate(back, solids, false), 2 * h * force,
+              1e-6 * 2 * h * force);
+  // only so often, that a minimisation comes to an end
+  int follows = 1;
+  for (; follows < 20; ++follows)
+    if (potential.evaluate(at(follows % 2 == 0 ? 0.002 : 0.0), solids, true);
+        std::abs(friction() - kFriction) > 1e-3 * kFriction)
+      break;
+  EXPECT_EQ(follows, 5);
+  potential.beginSolution();   // switches it off, and lagFriction() goes on as ever
+  EXPECT_GT(potential.lagFriction(), 0.1);
+}
+
 /// Springs of friction go on with the force that the last step left, which normal forces limit but do not change, and
 /// turn with what touches.
 TEST(ContactFriction, SpringsLastFromStepToStep)

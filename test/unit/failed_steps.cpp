@@ -222,7 +222,7 @@ TEST(FailedSteps, AFirstStepWithADampedRodAndABodyCanBeHalved)
   {
     Group g = tumbling(true);
     TimeConfig time = withIntegrator(integrator);
-    time.newton.max_iterations = 6;   // the whole step needs more, a part of it does not
+    time.newton.max_iterations = 4;   // the whole step needs more, a part of it does not
     World world = g.world(time, 0.02);
     const StepReport report = world.step(g.state, g.inputs);
     EXPECT_TRUE(report.ok) << named("", integrator) << ": " << report.message;

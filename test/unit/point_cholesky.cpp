@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "island/point_sweeps.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/linalg/symmetric_sweeps.h"
 #include "test/support/cloths.h"
@@ -39,6 +40,64 @@ struct System
   }
   int points() const { return static_cast<int>(mesh.vertices.cols()); }
 };
+
+/// A matrix by its unknowns, as islands have it, of points and of one body that turns.
+TEST(PointSweeps, SolveWhatDenseFactorsSolve)
+{
+  System s;
+  const int cloth = 3 * s.points(), n = cloth + 6;
+  MatrixXd A = MatrixXd::Zero(n, n);
+  A.topLeftCorner(cloth, cloth) = denseOf(s.blocks);
+  A.bottomRightCorner(6, 6).diagonal() << 4, 4, 4, 0.1, 0.2, 0.3;
+  Random random(5);
+  for (int contact = 0; contact < 20; ++contact)   // of a point and the body
+  {
+    const int point = 3 * ((7 * contact) % s.points());
+    const Eigen::Vector3d normal = random.vector().normalized(), arm = random.vector(0.3);
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(n);
+    row.segment<3>(point) = normal;
+    row.segment<3>(cloth) = -normal;
+    row.tail<3>() = -arm.cross(normal);
+    A += 3.0 * row * row.transpose();
+  }
+  const auto solve = [&](const MatrixXd& matrix, double tolerance, VectorXd& x) {
+    std::vector<int> starts{0}, rows;
+    std::vector<double> values;
+    for (int j = 0; j < n; ++j)
+    {
+      for (int i = j; i < n; ++i)
+        if (matrix(i, j) != 0.0 || i == j)
+        {
+          rows.push_back(i);
+          values.push_back(matrix(i, j));
+        }
+      starts.push_back(static_cast<int>(rows.size()));
+    }
+    std::vector<char> turns(n / 3, 0);
+    turns.back() = 1;
+    std::vector<double> right(n);
+    for (double& b : right)
+      b = random.vector()[0];
+    PointSweeps sweeps;
+    sweeps.setPattern(starts, rows, turns);
+    const LinearResult result = sweeps.solve(values, right, tolerance, 500);
+    sweeps.copySolution(x.data());
+    x = matrix * x - Eigen::Map<const VectorXd>(right.data(), n);   // what is left
+    return result;
+  };
+  VectorXd left(n);
+  const LinearResult result = solve(A, 1e-10, left);
+  EXPECT_TRUE(result.definite);
+  EXPECT_LT(left.norm(), 1e-8);   // of a right-hand side of size 10
+  // nothing is left that would push all places together
+  VectorXd sum = VectorXd::Zero(3);
+  solve(A, 1e-2, left);
+  for (int i = 0; i < n - 3; i += 3)
+    sum += left.segment(i, 3);
+  EXPECT_LT(sum.norm(), 1e-10);
+  A(cloth + 3, cloth + 3) = -1.0;
+  EXPECT_FALSE(solve(A, 1e-10, left).definite);
+}
 
 TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
 {

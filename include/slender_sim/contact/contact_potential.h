@@ -174,15 +174,14 @@ struct ContactRow
   double stiffness = 0.0;
 };
 
-/// When to factor with contacts' whole second derivatives, which Newton's method wants where curves run along each
-/// other but which may leave the matrix indefinite: after a failure not for the next 1, 3, 7, 15 factorisations.
-class WholeStiffness
+/// When to try again what may fail: after a failure not for the next 1, 3, 7, 15 times.
+class Backoff
 {
 public:
   bool due() { return --after_ < 0; }
-  void tried(bool definite)
+  void tried(bool succeeded)
   {
-    pause_ = definite ? 0 : std::min(15, 2 * pause_ + 1);
+    pause_ = succeeded ? 0 : std::min(15, 2 * pause_ + 1);
     after_ = pause_;
   }
 
@@ -240,6 +239,12 @@ public:
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
   /// of a contact's force over the largest force.
   double lagFriction();
+  /// Changes that lagFriction() returns are negligible below this [-].
+  static constexpr double kLagTolerance = 1e-2;
+  /// With `on`, each evaluate() with stiffness takes the normal forces and tangent planes of friction from its own
+  /// configuration, if they have changed by more than kLagTolerance. The potential is shifted so that it does not jump.
+  /// This happens a few times per begin(), so that a minimisation comes to an end; beginSolution() switches it off.
+  void followFriction(bool on);
   /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
   /// threads have none, because their pieces change.
   const std::vector<FrictionSpring>& springs() const;
@@ -255,11 +260,12 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
 
-  /// Potential [J] at a configuration; infinite where surfaces meet or x is not finite. Fills terms(), in an order that
-  /// depends on x and solids only; their stiffness and rows() only on request. The second derivative is exact for pairs
-  /// of segments and triangles; of solids, what their own curvature and turning add to it is left out, and friction's
-  /// is that of the secant where it slips back and forth. `turns`: per point, by how much the segment that begins there
-  /// has turned about its tangent since begin() [rad]; null: none has turned.
+  /// Potential [J] at a configuration, up to what followFriction() adds; infinite where surfaces meet or x is not
+  /// finite. Fills terms(), in an order that depends on x and solids only; their stiffness and rows() only on request.
+  /// The second derivative is exact for pairs of segments and triangles; of solids, what their own curvature and
+  /// turning add to it is left out, and friction's is that of the secant where it slips back and forth. `turns`: per
+  /// point, by how much the segment that begins there has turned about its tangent since begin() [rad]; null: none has
+  /// turned.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns = nullptr);
   const std::vector<ContactTerm>& terms() const;
@@ -290,7 +296,8 @@ public:
   /// stiffer barrier opens no gap. The next call finds this, takes the stiffness back, and the object keeps it until
   /// begin(). Returns whether a barrier has changed.
   bool stiffen(bool converged);
-  /// The last evaluate() was where a solution begins: stiffen() tells from there whether gaps have opened.
+  /// The last evaluate() was where a solution begins: stiffen() tells from there whether gaps have opened, and friction
+  /// no longer follows.
   void beginSolution();
 
 private:

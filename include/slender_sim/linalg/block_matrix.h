@@ -16,6 +16,8 @@ public:
   BlockMatrix() = default;
   /// Elements by their points, one column each; several kinds with different numbers of points.
   BlockMatrix(int points, const std::vector<Eigen::MatrixXi>& elements);
+  /// By its pattern: column j has the blocks starts[j] .. starts[j + 1] - 1, with ascending rows from j on.
+  BlockMatrix(std::vector<int> starts, std::vector<int> rows);
 
   int points() const { return static_cast<int>(starts_.size()) - 1; }
   int blocks() const { return static_cast<int>(rows_.size()); }

@@ -21,8 +21,8 @@ public:
   SymmetricSweeps(const BlockMatrix& a, const PointMatrix* b);
 
   /// The values of A as they are now; right-hand sides and solutions are zero at held points, which must stay where
-  /// they are.
-  void set(double factor, const std::vector<char>& held);
+  /// they are. `apart`: points that the common motion leaves out, because their numbers are not those of a place.
+  void set(double factor, const std::vector<char>& held, const std::vector<char>* apart = nullptr);
   /// Of right-hand sides and residuals.
   double norm(const PointVector& r);
   /// As ConjugateGradients::solve. The motion of all free points together, the slowest to converge, is solved before
@@ -37,6 +37,7 @@ public:
 
 private:
   void setWhole();
+  bool moves(int point) const { return !(*held_)[point] && !(apart_ && (*apart_)[point]); }
   /// r_: the residual.
   void leave(const PointVector& right_hand_side, const PointVector& x);
   /// Moves all free points alike, so that none of these forces on them together is left.
@@ -55,7 +56,7 @@ private:
   std::vector<int> b_diagonal_, b_right_, b_ends_;
   const PointMatrix* b_ = nullptr;
   double factor_ = 0;
-  const std::vector<char>* held_ = nullptr;
+  const std::vector<char>*held_ = nullptr, *apart_ = nullptr;
   /// SweptMatrix::order, so that points visited in turn seldom wait for each other
   std::vector<int> order_;
   SweptMatrix swept_;

@@ -54,8 +54,8 @@ TimeConfig readTime(const YamlCursor& at)
              {{"auto", IslandSolver::automatic},
               {"cholesky", IslandSolver::cholesky},
               {"conjugate_gradients", IslandSolver::conjugate_gradients}},
-             "Solver of the linear equations of rods, threads and bodies that touch or are joined. Without the key, or "
-             "with auto, it is chosen by the number of parts and of contacts.");
+             "Solver of the linear equations of objects that touch or are joined. Without the key, or with auto, it is "
+             "chosen by their kinds and number, and by the number of contacts.");
   newton.finish();
   map.finish();
   return time;
