@@ -82,7 +82,7 @@ const std::vector<Plan>& plans()
       {"Cloth against formulas and measurements",
        "",
        {"willmore_sphere", "willmore_hole", "fabric_drape", "plate_poisson", "curved_shells"},
-       {"plate", "stick_slip_strip", "flag", "drape", "garments", "stiffness_range"}},
+       {"plate", "stick_slip_strip", "flag", "drape", "garments", "coupling_peers", "stiffness_range"}},
       {"Tracking",
        "Shells that follow a guide exactly on average.",
        {"breathing_surface", "rubber_band", "clustering"},
