@@ -34,13 +34,20 @@ struct PeerScene
   double peer_iterations;
 };
 
-std::string sheet(int cells, double side, double z, double modulus, const std::string& more)
+/// Side and height [m], Young's modulus [Pa], damping of mass [1/s] and of stiffness [s].
+struct Sheet
+{
+  double side = 1.0, z = 0.0, modulus = 1e5, mass_damping = 0.1, stiffness_damping = 0.005;
+};
+
+std::string sheet(int cells, const Sheet& s, const std::string& more)
 {
   std::ostringstream text;
-  text << "cloths:\n  - name: sheet\n    grid: {corner: [" << -0.5 * side << ", " << -0.5 * side << ", " << z
-       << "], sides: [[" << side << ", 0, 0], [0, " << side << ", 0]], cells: " << cells << ", pattern: alternating}\n"
-       << "    material: {area_density: 0.2, thickness: 0.001, youngs_modulus: " << modulus
-       << ", poissons_ratio: 0.3}\n    bending: {modulus: 1.0e-6}\n    damping: {mass: 0.1, stiffness: 0.005}\n"
+  text << "cloths:\n  - name: sheet\n    grid: {corner: [" << -0.5 * s.side << ", " << -0.5 * s.side << ", " << s.z
+       << "], sides: [[" << s.side << ", 0, 0], [0, " << s.side << ", 0]], cells: " << cells
+       << ", pattern: alternating}\n    material: {area_density: 0.2, thickness: 0.001, youngs_modulus: " << s.modulus
+       << ", poissons_ratio: 0.3}\n    bending: {modulus: 1.0e-6}\n    damping: {mass: " << s.mass_damping
+       << ", stiffness: " << s.stiffness_damping << "}\n"
        << more;
   return text.str();
 }
@@ -60,7 +67,7 @@ std::string fallingBall(int cells, double range)
 {
   std::ostringstream text;
   text << "time: {step: 0.01, duration: 1, integrator: implicit_euler}\ncontact: {gap: " << range << "}\n"
-       << sheet(cells, 1.0, 0.0, 1e5, kTouching + corners({"lower_left", "lower_right", "upper_left", "upper_right"}))
+       << sheet(cells, {}, kTouching + corners({"lower_left", "lower_right", "upper_left", "upper_right"}))
        << "bodies:\n  - {name: ball, mass: 1, shape: {sphere: {radius: 0.1}}, friction: 0.3, pose: {position: [0, 0, "
           "0.4]}}\n";
   return text.str();
@@ -70,12 +77,13 @@ std::string sheetOnSphere(int cells, double range)
 {
   std::ostringstream text;
   text << "time: {step: 0.01, duration: 1.5}\ncontact: {gap: " << range << "}\n"
-       << sheet(cells, 1.0, 0.25, 1e5, kTouching)
+       << sheet(cells, {1.0, 0.25}, kTouching)
        << "obstacles:\n  - {name: sphere, shape: {sphere: {radius: 0.2}}, friction: 0.3}\n";
   return text.str();
 }
 
-/// The peer's example: 24 boxes of 1 kg in stacks of eight stand on a sheet, of which one edge is lifted and drawn.
+/// The peer's example: 24 boxes of 1 kg in stacks of eight stand on a sheet, of which one edge is lifted and drawn. Its
+/// sheet has E h = 5 N/m and a limit of strain, in place of which this one is ten times as stiff.
 std::string boxesOnCloth(int cells)
 {
   constexpr double kSide = 0.08, kThickness = 1e-3, kLift = 0.1, kSpeed = 0.125;   // [m], [m/s]
@@ -87,7 +95,7 @@ std::string boxesOnCloth(int cells)
            << ", 0, 0, 0, 1]";
   }
   text << "time: {step: 0.03333333333, duration: 4, integrator: implicit_euler}\ncontact: {gap: 0.0005}\n"
-       << sheet(cells, 0.5, kThickness, 5e4,
+       << sheet(cells, {0.5, kThickness, 5e4, 1.0, 0.2},
                 "    contact: {friction: 0.5, thickness: 0.001, method: barrier}\n    grasps:\n      edge: {edge: "
                 "upper, attach: initial, motion: {table: [" +
                     motion.str() + "]}}\n")
@@ -115,7 +123,7 @@ std::string twistedSheet(int cells)
     return "{attach: initial, motion: {table: [" + rows.str() + "]}, edge: ";
   };
   return "time: {step: 0.03333333333, duration: 3}\ngravity: [0, 0, 0]\ncontact: {gap: 0.0005}\n" +
-         sheet(cells, 0.5, 0.0, 5e3,
+         sheet(cells, {0.5, 0.0, 5e3, 0.1, 0.1},
                "    contact: {friction: 0, thickness: 0.001, method: barrier}\n    grasps:\n      left: " +
                    turning(1.0) + "left}\n      right: " + turning(-1.0) + "right}\n");
 }
@@ -130,8 +138,7 @@ std::string textOf(const PeerScene& scene, double range)
     return boxesOnCloth(scene.cells);
   if (scene.name == "twist")
     return twistedSheet(scene.cells);
-  return "time: {step: 0.01, duration: 1}\n" +
-         sheet(scene.cells, 1.0, 0.0, 1e5, corners({"upper_left", "upper_right"}));
+  return "time: {step: 0.01, duration: 1}\n" + sheet(scene.cells, {}, corners({"upper_left", "upper_right"}));
 }
 
 struct PeerRun
@@ -212,9 +219,9 @@ void runCouplingPeers(StudyContext& context)
   constexpr double kRange = 0.002;   // [m], that of the peer
   std::vector<PeerScene> scenes{{"hang", 20, 1.0, 2.77}, {"ball", 20, 1.0, 4.44}};
   if (!context.quick())
-    scenes = {{"hang", 20, 1, 2.77},      {"hang", 40, 1, 3.46},  {"hang", 80, 1, 4.04},   {"hang", 160, 1, 0},
-              {"ball", 20, 1, 4.44},      {"ball", 40, 1, 6.11},  {"ball", 80, 1, 8.77},   {"sphere", 20, 1.5, 5.95},
-              {"sphere", 40, 1.5, 11.37}, {"sphere", 80, 1.5, 0}, {"boxes", 64, 4, 11.80}, {"twist", 64, 3, 10.03}};
+    scenes = {{"hang", 20, 1, 2.77},      {"hang", 40, 1, 3.46},     {"hang", 80, 1, 4.04},   {"hang", 160, 1, 4.66},
+              {"ball", 20, 1, 4.44},      {"ball", 40, 1, 6.11},     {"ball", 80, 1, 8.77},   {"sphere", 20, 1.5, 5.95},
+              {"sphere", 40, 1.5, 11.37}, {"sphere", 80, 1.5, 24.7}, {"boxes", 64, 4, 11.80}, {"twist", 64, 3, 10.03}};
   double iterations = 0.0, ball_iterations = 0.0, time = 0.0, depth[2] = {0.0, 0.0};
   for (std::size_t k = 0; k < scenes.size(); ++k)
   {
