@@ -168,8 +168,8 @@ private:
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
-  int follows_left_ = 0;   ///< how often friction may follow before the next begin()
-  double shift_ = 0.0;     ///< of the potential, so that it has not jumped where friction followed [J]
+  int follows_left_ = 0;   ///< how often friction may still follow before the next begin()
+  double shift_ = 0.0;     ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;

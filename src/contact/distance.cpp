@@ -17,7 +17,7 @@ double closestOnSegment(const Eigen::Vector3d& p, const Eigen::Vector3d& a, cons
 
 namespace {
 
-/// For all segments, in particular those that are nearly parallel or have no extent.
+/// Does what closestOfSegments() does, also for segments that are nearly parallel or have no length.
 SegmentPair closestOfAnySegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
                                  const Eigen::Vector3d& b1)
 {
@@ -54,14 +54,14 @@ SegmentPair closestOfAnySegments(const Eigen::Vector3d& a0, const Eigen::Vector3
 SegmentPair closestOfSegments(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1, const Eigen::Vector3d& b0,
                               const Eigen::Vector3d& b1)
 {
-  constexpr double kParallel = 1e-2;   // of the product of the squared lengths; then two digits are lost
+  constexpr double kParallel = 1e-2;   // square of the sine of the angle; at this angle two digits are lost
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0, w = b0 - a0;
   const double ee = e.squaredNorm(), ff = f.squaredNorm(), ef = e.dot(f), ew = e.dot(w), fw = f.dot(w);
   const double both = ee * ff - ef * ef;
   if (!(both > kParallel * ee * ff))
     return closestOfAnySegments(a0, a1, b0, b1);
-  // Where the lines are nearest, then the nearest t for that s, and the nearest s if t is at an end [Ericson,
-  // Real-Time Collision Detection, 5.1.9].
+  // s is where the lines are nearest, clamped to the segment, and t is nearest to it. If t is beyond an end, s is the
+  // place nearest to that end [Ericson, Real-Time Collision Detection, 5.1.9].
   const double s = std::clamp((ew * ff - fw * ef) / both, 0.0, 1.0), t = (ef * s - fw) / ff;
   if (t < 0.0)
     return {std::clamp(ew / ee, 0.0, 1.0), 0.0};

@@ -146,12 +146,13 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
 
 void ContactPotential::Impl::beginFollowing()
 {
-  constexpr int kMostFollows = 5;   // where contacts stick and slip by turns they would never end
+  constexpr int kMostFollows = 5;   // Contacts that alternately stick and slip would follow without end.
   following = false;
   follows_left_ = kMostFollows;
 }
 
-/// Friction of all contacts, from normal forces of an earlier configuration or, if friction follows, of this one.
+/// Adds the friction of all contacts. Its normal forces are those of an earlier configuration or, if friction follows,
+/// those of this one.
 double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
                                            const Eigen::VectorXd* turns, bool with_stiffness)
 {
@@ -172,7 +173,7 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   return before;
 }
 
-/// Changes of at most `least` are not taken over.
+/// Does not take the new forces over if they have changed by less than `least`.
 double ContactPotential::Impl::lagFriction(double least)
 {
   const auto comes_before = [](const Contact& a, const Contact& b) {

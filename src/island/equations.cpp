@@ -270,7 +270,7 @@ double Equations::incrementSize() const
   return std::max(largest, tolerance_ * moved_sticking_ / kStick);
 }
 
-/// How far the direction moves touching surfaces against each other. Once that is little, friction follows.
+/// Measures how far the direction moves touching surfaces relative to each other. If that is little, friction follows.
 void Equations::measureContacts()
 {
   constexpr double kLittle = 0.1;   // of the smallest gap

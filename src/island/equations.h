@@ -160,7 +160,6 @@ private:
   void addForce(const ContactTerm& term);
   void assemble(const HessianShift& shift, bool whole);
   bool factor(const HessianShift& shift);
-  void takeGradients();
   bool anyAverages() const;
   void keepAverages();
   void follow();
@@ -178,7 +177,7 @@ private:
   int linear_iterations_ = 0;
   int blocks_ = 0;                         ///< of the matrix
   std::vector<std::pair<int, int>> met_;   ///< blocks of which parts touch each other
-  std::vector<char> turns_of_triples_;     ///< see Part::addTriples()
+  std::vector<char> turns_of_triples_;     ///< result of Part::addTriples() for the coupled parts
   std::vector<Key> keys_, keys_before_;    ///< room for contacts that the pattern has, sorted
 
   std::unique_ptr<ContactPotential> contact_;
@@ -193,8 +192,8 @@ private:
   bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
-  /// Largest motion of surfaces against each other by the direction: where they touch [m], and where friction sticks,
-  /// over the stretch at which it slips [-].
+  /// Largest relative motion of touching surfaces by the direction: of all contacts [m], and of contacts that stick, as
+  /// a fraction of the stretch at which they slip [-].
   double moved_at_contact_ = 0, moved_sticking_ = 0;
 };
 

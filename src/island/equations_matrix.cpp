@@ -227,8 +227,9 @@ SharedMatrix::Solver Equations::chooseSolver()
                                                        : SharedMatrix::Solver::cholesky;
 }
 
-/// Sweeps over points solve the equations of cloth faster than factors, whatever the size. Rods are too stiff for them,
-/// and so are piles of bodies. Small matrices are solved to round-off, because that costs little.
+/// Returns whether sweeps over points are the fastest solver. They are faster than a factorisation for cloth of any
+/// size, but they converge slowly for rods and for piles of bodies. Small matrices are factored, which solves them to
+/// round-off at little cost.
 bool Equations::sweepsPay()
 {
   constexpr int kLeastUnknowns = 300, kTriplesPerBody = 30;
@@ -284,7 +285,9 @@ void Equations::assemble(const HessianShift& shift, bool whole)
 
 bool Equations::factor(const HessianShift& shift)
 {
-  takeGradients();   // sweeps solve at once
+  for (const Part* part : parts_)
+    if (part->coupled)
+      part->takeGradient(matrix_.solution());
   const auto assembled = [&](bool whole) { assemble(shift, whole); };
   return exact_ ? matrix_.factorExactly(assembled) : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
 }
@@ -340,16 +343,8 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   return sum;
 }
 
-void Equations::takeGradients()
-{
-  for (const Part* part : parts_)
-    if (part->coupled)
-      part->takeGradient(matrix_.solution());
-}
-
 void Equations::solve()
 {
-  takeGradients();
   const bool solved = matrix_.solve();
   linear_iterations_ += matrix_.linearIterations();
   if (!solved)

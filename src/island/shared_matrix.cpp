@@ -122,10 +122,8 @@ bool SharedMatrix::factorPresent()
 
 bool SharedMatrix::sweep()
 {
-  // Newton's method takes as many iterations as with exact solutions. More iterations than the most would cost more
-  // than a factorisation.
-  constexpr double kTolerance = 1e-4;
-  constexpr int kMostIterations = 250;
+  constexpr double kTolerance = 1e-4;    // Newton's method then needs as many iterations as with exact solutions.
+  constexpr int kMostIterations = 250;   // A factorisation costs about as much as a hundred of them.
   if (unknowns_ == 0 || !swept_.due())
     return factorDirectly();
   direct_ = false;

@@ -17,10 +17,11 @@ namespace slender {
 /// For one pattern: begin(), then what couples unknowns by note(), notePairs() and noteBases(), then finish(). For one
 /// matrix: factor() with a function that calls clear() and adds all entries.
 ///
-/// The matrix is solved by sparse Cholesky factorisation, or by conjugate gradients. These are preconditioned by the
-/// factorisation of blocks, which are the matrix without what couples unknowns of different blocks, or by sweeps over
-/// points of three unknowns each. Sweeps solve in factor(), because only then it is known whether the matrix is
-/// positive definite: the right-hand side must be in solution() before.
+/// There are three solvers: sparse Cholesky factorisation, conjugate gradients that are preconditioned by the
+/// factorisation of blocks (the matrix without the entries that couple different blocks), and conjugate gradients that
+/// are preconditioned by sweeps over points of three unknowns each. Put the right-hand side into solution() before you
+/// call factor(). Sweeps already solve the equations in factor(), because only the solution shows whether the matrix is
+/// positive definite.
 class SharedMatrix
 {
 public:
@@ -57,8 +58,8 @@ public:
   /// Everything that these rows contain together.
   void noteRows(const Columns* rows, int count);
   void noteBases(const Bases& bases);
-  /// `blocks`: the number of the block that each unknown belongs to; only conjugate gradients need it. `turns`: only
-  /// for sweeps, see PointSweeps.
+  /// `blocks`: the number of the block that each unknown belongs to; only `conjugate_gradients` needs it. `turns`: see
+  /// PointSweeps; only `sweeps` needs it.
   void finish(Solver solver = Solver::cholesky, const std::vector<int>& blocks = {},
               const std::vector<char>& turns = {});
   int unknowns() const { return unknowns_; }
@@ -82,7 +83,7 @@ public:
   void addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns);
   void addRow(const ContactRow& row, const Bases& bases, bool whole);
 
-  /// Forgets the failures of factorisations with whole second derivatives, and those of sweeps.
+  /// Forgets that factorisations with whole second derivatives, or sweeps, have failed.
   void beginStage() { whole_ = swept_ = {}; }
   /// Factors what assemble(whole) makes: with the contacts' whole second derivatives where `contacts` says that there
   /// are any, that is due and leaves the matrix positive definite; else without those parts of them that may be
@@ -146,10 +147,10 @@ private:
   bool sweep();
   void multiply(const std::vector<double>& x, std::vector<double>& y) const;
 
-  /// Factorisations with whole second derivatives: Newton's method wants them where curves run along each other, but
-  /// they may leave the matrix indefinite.
+  /// When to factor with whole second derivatives. Newton's method needs them where curves run along each other, but
+  /// the matrix may be indefinite with them.
   Backoff whole_;
-  Backoff swept_;   ///< sweeps that take too many iterations
+  Backoff swept_;   ///< When to try sweeps. They fail if they need too many iterations.
   int unknowns_ = 0;
   std::vector<std::vector<int>> columns_;
   std::vector<int> starts_, rows_;   ///< lower triangle by columns, as SparseCholesky has it

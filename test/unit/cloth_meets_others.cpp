@@ -131,7 +131,7 @@ TEST_P(ClothAndBall, WhatOneLosesTheOtherGets)
 INSTANTIATE_TEST_SUITE_P(ClothMeetsOthers, ClothAndBall,
                          testing::Values("cloths.0.grid.cells=8", "cloths.0.grid.cells=14"));
 
-/// Cloth and bodies are solved by sweeps over points, to a tolerance. They end where factors end.
+/// Cloth and bodies are solved by sweeps over points. The motion is the same as with a factorisation.
 TEST(ClothMeetsOthers, SweepsAgreeWithFactors)
 {
   const std::vector<std::string> fine{"cloths.0.grid.cells=12", "gravity=[0, 0, 0]"};

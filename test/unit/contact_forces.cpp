@@ -295,19 +295,36 @@ TEST(ContactFriction, SticksAndSlipsAsCoulombSays)
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
 
-/// Friction that follows has the normal forces of the present configuration. The potential is the one whose slope these
-/// forces are, and has not jumped.
+/// One segment above a floor, within the gap.
+struct SegmentOnFloor
+{
+  static constexpr double kStep = 0.01, kFriction = 0.4;
+  Eigen::Matrix3Xd x;
+  const std::vector<Pose> solids = std::vector<Pose>(1);
+  ContactPotential potential = make();
+
+private:
+  ContactPotential make()
+  {
+    ContactSurface surface;
+    addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, kFriction);
+    surface.solids.push_back({Plane{}, kFriction, {}});
+    ContactPotential made(surface, gapOptions());
+    made.setStiffness(2.0);
+    return made;
+  }
+};
+
+/// If friction follows, its normal forces are those of the present configuration. The forces are the gradient of the
+/// potential, and the potential does not jump.
 TEST(ContactFriction, FollowsNormalForces)
 {
-  constexpr double kStep = 0.01, kFriction = 0.4;
-  ContactSurface surface;
-  Eigen::Matrix3Xd x;
-  addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, kFriction);
-  surface.solids.push_back({Plane{}, kFriction, {}});
-  const std::vector<Pose> solids(1);
+  SegmentOnFloor on_floor;
+  Eigen::Matrix3Xd& x = on_floor.x;
+  const std::vector<Pose>& solids = on_floor.solids;
+  ContactPotential& potential = on_floor.potential;
+  constexpr double kStep = SegmentOnFloor::kStep, kFriction = SegmentOnFloor::kFriction;
   const Eigen::Vector3d side(0.6, 0.8, 0), down(0, 0, -1);
-  ContactPotential potential(surface, gapOptions());
-  potential.setStiffness(2.0);
   potential.begin(x, solids, kStep);
   const double full = gapOptions().slip_speed * kStep;
   const auto at = [&](double deep) { return Eigen::Matrix3Xd(x.colwise() + (20 * full * side + deep * down)); };
@@ -322,14 +339,14 @@ TEST(ContactFriction, FollowsNormalForces)
   const Eigen::Matrix3Xd there = at(0.002).colwise() + h * side, back = at(0.002).colwise() - h * side;
   EXPECT_NEAR(potential.evaluate(there, solids, false) - potential.evaluate(back, solids, false), 2 * h * force,
               1e-6 * 2 * h * force);
-  // only so often, that a minimisation comes to an end
+  // Friction follows five times, so that a minimisation ends.
   int follows = 1;
   for (; follows < 20; ++follows)
     if (potential.evaluate(at(follows % 2 == 0 ? 0.002 : 0.0), solids, true);
         std::abs(friction() - kFriction) > 1e-3 * kFriction)
       break;
   EXPECT_EQ(follows, 5);
-  potential.beginSolution();   // switches it off, and lagFriction() goes on as ever
+  potential.beginSolution();   // lagFriction() still takes new forces over
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
 
@@ -337,16 +354,13 @@ TEST(ContactFriction, FollowsNormalForces)
 /// turn with what touches.
 TEST(ContactFriction, SpringsLastFromStepToStep)
 {
-  constexpr double kStep = 0.01, kFriction = 0.4;
-  ContactSurface surface;
-  Eigen::Matrix3Xd x;
-  addCurve(surface, x, nodesAbout({0, 0, kCurveRadius + 0.008}, {0.3, 0, 0}, 1), kCurveRadius, kFriction);
-  surface.solids.push_back({Plane{}, kFriction, {}});
-  const std::vector<Pose> solids(1);
+  SegmentOnFloor on_floor;
+  Eigen::Matrix3Xd& x = on_floor.x;
+  const std::vector<Pose>& solids = on_floor.solids;
+  ContactPotential& potential = on_floor.potential;
+  constexpr double kStep = SegmentOnFloor::kStep, kFriction = SegmentOnFloor::kFriction;
   const double full = gapOptions().slip_speed * kStep;
   const Eigen::Vector3d side(0.6, 0.8, 0);
-  ContactPotential potential(surface, gapOptions());
-  potential.setStiffness(2.0);
   const auto forceAfter = [&](double slip) -> Eigen::Vector3d {
     potential.begin(x, solids, kStep);
     x.colwise() += slip * side;
@@ -383,6 +397,7 @@ TEST(ContactFriction, SpringsLastFromStepToStep)
   potential.evaluate(x, solids, false);
   EXPECT_EQ(potential.terms().back().force.norm(), 0.0);
 
+  ContactSurface surface = potential.surface();
   surface.objects[0].owner = 0;   // a strand of a thread, whose pieces change
   ContactPotential strand(surface, gapOptions());
   strand.begin(x, solids, kStep);

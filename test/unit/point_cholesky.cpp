@@ -41,7 +41,7 @@ struct System
   int points() const { return static_cast<int>(mesh.vertices.cols()); }
 };
 
-/// A matrix by its unknowns, as islands have it, of points and of one body that turns.
+/// The matrix of an island with a cloth and a body, in the order of its unknowns.
 TEST(PointSweeps, SolveWhatDenseFactorsSolve)
 {
   System s;
@@ -89,7 +89,7 @@ TEST(PointSweeps, SolveWhatDenseFactorsSolve)
   const LinearResult result = solve(A, 1e-10, left);
   EXPECT_TRUE(result.definite);
   EXPECT_LT(left.norm(), 1e-8);   // of a right-hand side of size 10
-  // nothing is left that would push all places together
+  // The residual has no force that acts on all points together.
   VectorXd sum = VectorXd::Zero(3);
   solve(A, 1e-2, left);
   for (int i = 0; i < n - 3; i += 3)

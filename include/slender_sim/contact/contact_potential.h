@@ -174,7 +174,7 @@ struct ContactRow
   double stiffness = 0.0;
 };
 
-/// When to try again what may fail: after a failure not for the next 1, 3, 7, 15 times.
+/// Decides when to try again a method that may fail. After each failure in a row it skips more attempts: 1, 3, 7, 15.
 class Backoff
 {
 public:
@@ -239,11 +239,11 @@ public:
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
   /// of a contact's force over the largest force.
   double lagFriction();
-  /// Changes that lagFriction() returns are negligible below this [-].
+  /// A change that lagFriction() returns is negligible if it is at most this [-].
   static constexpr double kLagTolerance = 1e-2;
-  /// With `on`, each evaluate() with stiffness takes the normal forces and tangent planes of friction from its own
-  /// configuration, if they have changed by more than kLagTolerance. The potential is shifted so that it does not jump.
-  /// This happens a few times per begin(), so that a minimisation comes to an end; beginSolution() switches it off.
+  /// If this is on, each evaluate() with stiffness first does what lagFriction() does, unless the change is negligible.
+  /// A constant is then added to the potential, so that the potential does not jump. Friction follows at most a few
+  /// times after begin(), because a minimisation might not end otherwise. beginSolution() switches it off.
   void followFriction(bool on);
   /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
   /// threads have none, because their pieces change.
@@ -260,12 +260,12 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
 
-  /// Potential [J] at a configuration, up to what followFriction() adds; infinite where surfaces meet or x is not
-  /// finite. Fills terms(), in an order that depends on x and solids only; their stiffness and rows() only on request.
-  /// The second derivative is exact for pairs of segments and triangles; of solids, what their own curvature and
-  /// turning add to it is left out, and friction's is that of the secant where it slips back and forth. `turns`: per
-  /// point, by how much the segment that begins there has turned about its tangent since begin() [rad]; null: none has
-  /// turned.
+  /// Returns the potential [J] at a configuration, plus the constant of followFriction(). It is infinite where surfaces
+  /// meet or x is not finite. Fills terms(), in an order that depends on x and solids only; their stiffness and rows()
+  /// are computed only on request. The second derivative is exact for pairs of segments and triangles. For solids, the
+  /// parts that come from their own curvature and rotation are left out. For friction that slips back and forth, the
+  /// secant is used. `turns` has one entry per point: by how much the segment that begins there has turned about its
+  /// tangent since begin() [rad]. Null means that no segment has turned.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns = nullptr);
   const std::vector<ContactTerm>& terms() const;
@@ -296,8 +296,8 @@ public:
   /// stiffer barrier opens no gap. The next call finds this, takes the stiffness back, and the object keeps it until
   /// begin(). Returns whether a barrier has changed.
   bool stiffen(bool converged);
-  /// The last evaluate() was where a solution begins: stiffen() tells from there whether gaps have opened, and friction
-  /// no longer follows.
+  /// Call this when a solution begins, after evaluate() at its start. stiffen() compares later gaps with those of that
+  /// evaluation. Switches followFriction() off.
   void beginSolution();
 
 private:

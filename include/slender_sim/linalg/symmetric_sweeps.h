@@ -21,7 +21,8 @@ public:
   SymmetricSweeps(const BlockMatrix& a, const PointMatrix* b);
 
   /// The values of A as they are now; right-hand sides and solutions are zero at held points, which must stay where
-  /// they are. `apart`: points that the common motion leaves out, because their numbers are not those of a place.
+  /// they are. `apart`: 1 for points that do not take part in the common motion, because their unknowns are not
+  /// coordinates; null: all points take part.
   void set(double factor, const std::vector<char>& held, const std::vector<char>* apart = nullptr);
   /// Of right-hand sides and residuals.
   double norm(const PointVector& r);
@@ -56,7 +57,8 @@ private:
   std::vector<int> b_diagonal_, b_right_, b_ends_;
   const PointMatrix* b_ = nullptr;
   double factor_ = 0;
-  const std::vector<char>*held_ = nullptr, *apart_ = nullptr;
+  const std::vector<char>* held_ = nullptr;
+  const std::vector<char>* apart_ = nullptr;
   /// SweptMatrix::order, so that points visited in turn seldom wait for each other
   std::vector<int> order_;
   SweptMatrix swept_;

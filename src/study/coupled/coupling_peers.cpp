@@ -21,11 +21,12 @@ namespace slender::study {
 
 namespace {
 
-constexpr double kMostSeconds = 300.0;   // [s] of CPU time per scene; what is left of it is not simulated
+constexpr double kMostSeconds = 300.0;   // CPU time after which a scene ends early [s]
 
-/// A scene of the peer's own measurements: a square sheet of cotton of 1 m and E h = 100 N/m, or its examples. The
-/// peer's iterations per step are those of its version 0.1.0 (InteractiveComputerGraphics/stark, commit 16197f7) with
-/// its own defaults, which end at changes of velocity of 1e-3 m/s; 0: it was not measured.
+/// A scene that both programs simulate. `hang`, `ball` and `sphere` have a square sheet of cotton with sides of 1 m and
+/// E h = 100 N/m. `boxes` and `twist` are examples of the peer. `peer_iterations` are the iterations per step of the
+/// peer (InteractiveComputerGraphics/stark 0.1.0, commit 16197f7). With its defaults a step ends when velocities change
+/// by less than 1e-3 m/s. 0 means that the peer was not measured.
 struct PeerScene
 {
   std::string name;
@@ -34,10 +35,12 @@ struct PeerScene
   double peer_iterations;
 };
 
-/// Side and height [m], Young's modulus [Pa], damping of mass [1/s] and of stiffness [s].
 struct Sheet
 {
-  double side = 1.0, z = 0.0, modulus = 1e5, mass_damping = 0.1, stiffness_damping = 0.005;
+  double side = 1.0, z = 0.0;         ///< length of a side, and height [m]
+  double modulus = 1e5;               ///< Young's modulus [Pa]
+  double mass_damping = 0.1;          ///< [1/s]
+  double stiffness_damping = 0.005;   ///< [s]
 };
 
 std::string sheet(int cells, const Sheet& s, const std::string& more)
@@ -62,7 +65,8 @@ std::string corners(const std::vector<std::string>& names)
 
 const std::string kTouching = "    contact: {friction: 0.3, thickness: 0.002, method: barrier}\n";
 
-/// `range`: of the barrier beyond the thickness of 2 mm [m]. The peer's repels within 2 mm of each surface.
+/// `range`: distance beyond the thickness of 2 mm within which surfaces repel each other [m]. Surfaces of the peer
+/// repel each other within 2 mm of each surface.
 std::string fallingBall(int cells, double range)
 {
   std::ostringstream text;
@@ -82,8 +86,9 @@ std::string sheetOnSphere(int cells, double range)
   return text.str();
 }
 
-/// The peer's example: 24 boxes of 1 kg in stacks of eight stand on a sheet, of which one edge is lifted and drawn. Its
-/// sheet has E h = 5 N/m and a limit of strain, in place of which this one is ten times as stiff.
+/// An example of the peer: 24 boxes of 1 kg stand in stacks of eight on a sheet. One edge of the sheet is lifted and
+/// then pulled. The sheet of the peer has E h = 5 N/m and a limit of strain. This sheet has no such limit and is ten
+/// times as stiff.
 std::string boxesOnCloth(int cells)
 {
   constexpr double kSide = 0.08, kThickness = 1e-3, kLift = 0.1, kSpeed = 0.125;   // [m], [m/s]
@@ -109,7 +114,7 @@ std::string boxesOnCloth(int cells)
   return text.str();
 }
 
-/// The peer's example: two opposite edges of a sheet turn against each other by 90 degrees a second.
+/// An example of the peer: two opposite edges of a sheet rotate in opposite directions, by 90 degrees a second each.
 std::string twistedSheet(int cells)
 {
   const auto turning = [](double sign) {
@@ -143,9 +148,10 @@ std::string textOf(const PeerScene& scene, double range)
 
 struct PeerRun
 {
-  double seconds = 0.0, cpu = 0.0;   ///< simulated, and of the CPU [s]
+  double seconds = 0.0;   ///< simulated time [s]
+  double cpu = 0.0;       ///< CPU time [s]
   int steps = 0, iterations = 0, cut_steps = 0;
-  double lowest = 0.0;   ///< of the body's centre [m]
+  double lowest = 0.0;   ///< lowest height of the body's centre [m]
   double cpuPerSecond() const { return cpu / seconds; }
   double iterationsPerStep() const { return static_cast<double>(iterations) / steps; }
 };
@@ -174,7 +180,8 @@ PeerRun runScene(const PeerScene& scene, double range)
   return run;
 }
 
-/// CPU seconds per simulated second of the peer: the command prints cpu_per_sim_s=NUMBER. 0: there is no command.
+/// Runs the peer and returns its CPU time per simulated second. The command prints cpu_per_sim_s=NUMBER. Returns 0 if
+/// there is no command.
 double peerTime(const PeerScene& scene)
 {
   const char* const command = std::getenv("SLENDER_PEER");
@@ -192,7 +199,7 @@ double peerTime(const PeerScene& scene)
   return time;
 }
 
-/// Least and most CPU time of a scene while the range of the barrier goes from 0.5 to 4 mm: their ratio.
+/// Runs a scene with ranges of the barrier from 0.5 to 4 mm. Returns the most CPU time over the least.
 double costOfRange(StudyContext& context, const PeerScene& scene)
 {
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
