@@ -61,7 +61,7 @@ void ClothPart::allocate()
     const auto edge = m.topology.edges.col(static_cast<Eigen::Index>(e));
     inverse_length_[e] = 1.0 / (m.rest.vertices.col(edge[1]) - m.rest.vertices.col(edge[0])).norm();
   }
-  for (PointVector* v : {&base_, &saved_, &direction_, &solution_})
+  for (PointVector* v : {&base_, &base_before_, &saved_, &direction_, &solution_})
     v->assign(stages_.x.size(), 0.0);
 }
 
@@ -99,7 +99,8 @@ void ClothPart::beginStage(std::size_t stage)
   if (averages_)
     averages_->forces.setZero();
   meetAverages();
-  base_ = system().start();
+  base_before_ = base_ = system().start();
+  moved_ = false;
   near_ = indefinite_ = false;
 }
 
@@ -179,11 +180,20 @@ void ClothPart::moveAlong(double alpha)
   if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
   {
     std::copy(base_.begin(), base_.end(), x.begin());
+    moved_ = false;
     return;
   }
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] = base_[i] + alpha * direction_[i];
+  moved_ = true;
   stages_.meetAverages();
+}
+
+void ClothPart::accept()
+{
+  base_before_.swap(base_);
+  base_ = stages_.x;
+  moved_ = false;
 }
 
 void ClothPart::retreat(double share)
@@ -240,9 +250,10 @@ void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_poin
 void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
   exact_ = near_ && shift.position == 0.0 && !linearized_;
+  const HessianKind kind = exact_ ? HessianKind::exact : HessianKind::semidefinite;
+  const PointVector* const from = linearized_ ? nullptr : moved_ ? &base_ : &base_before_;
   const ClothEvaluation e =
-      with_hessian ? system().evaluateHessian(stages_.x, exact_ ? HessianKind::exact : HessianKind::semidefinite)
-                   : system().evaluate(stages_.x);
+      with_hessian ? system().evaluateHessian(stages_.x, kind, from) : system().evaluate(stages_.x);
   largest_contact_ = 0.0;
   evaluation = {};
   evaluation.stretch = e.membrane;

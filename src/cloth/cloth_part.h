@@ -82,9 +82,9 @@ private:
   bool numberUnknowns() override;
   int unknowns() const override { return unknowns_; }
   void moveAlong(double alpha) override;
-  void accept() override { base_ = stages_.x; }
+  void accept() override;
   void saveBase() override { saved_ = base_; }
-  void restoreBase() override { base_ = saved_; }
+  void restoreBase() override { base_before_ = base_ = saved_; }
   void retreat(double share) override;
   void placeHeld(double fraction) override;
   bool heldMoves(double from, double to) const override;
@@ -138,6 +138,8 @@ private:
   long surface_version_ = 0;
   std::vector<double> inverse_length_;   ///< of edges at rest [1/m]
   PointVector base_, saved_, direction_, solution_;
+  PointVector base_before_;                         ///< base_ before the last accept()
+  bool moved_ = false;                              ///< the trial is a move from base_, and not base_ itself
   LinearOutcome outcome_ = LinearOutcome::solved;   ///< of the last solution with the own matrix
   StepReport counts_;                               ///< of linear equations that no report has yet
   double largest_contact_ = 0.0;                    ///< force on a vertex in the last evaluation [N]

@@ -223,7 +223,7 @@ ClothEvaluation ClothSystem::evaluate(const PointVector& x)
   return result;
 }
 
-ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind kind)
+ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind kind, const PointVector* from)
 {
   spend(kHessianWork);
   std::copy(base_.begin(), base_.end(), matrix_.values());
@@ -232,7 +232,8 @@ ClothEvaluation ClothSystem::evaluateHessian(const PointVector& x, HessianKind k
   ClothEvaluation result;
   result.potential = addLoads(x);
   for (const ClothTerm& term : terms_)
-    result.count(term.energy->account(), term.energy->addHessian(kind, x.data(), gradient_.data(), matrix_.values()));
+    result.count(term.energy->account(), term.energy->addHessian(kind, x.data(), gradient_.data(), matrix_.values(),
+                                                                 from ? from->data() : nullptr));
   for (const auto& load : loads_)
     load->addHessian(matrix_.values());
   return result;

@@ -65,8 +65,8 @@ public:
   ClothEvaluation energy(const PointVector& x);
   /// Overwrites gradient().
   ClothEvaluation evaluate(const PointVector& x);
-  /// The same with matrix().
-  ClothEvaluation evaluateHessian(const PointVector& x, HessianKind kind);
+  /// The same with matrix(). `from`: see PointTerm::addHessian().
+  ClothEvaluation evaluateHessian(const PointVector& x, HessianKind kind, const PointVector* from = nullptr);
   /// Adds the elastic and viscous parts only. `with_constant`: also that of the term with a constant matrix.
   ClothEvaluation addInternal(const PointVector& x, PointVector& gradient, bool with_constant = true);
   PointVector& gradient() { return gradient_; }

@@ -121,11 +121,12 @@ MembraneSums MembraneEnergy::addGradient(const double* x, double* gradient) cons
 }
 
 MembraneSums MembraneEnergy::addHessian(HessianKind kind, const double* x, const std::vector<int>& slots,
-                                        double* gradient, double* values) const
+                                        double* gradient, double* values, const double* from) const
 {
   MembraneSums sums;
   const auto& k = membraneKernels();
-  (kind == HessianKind::exact ? k.hessian : k.semidefiniteHessian)(arrays(), x, slots.data(), gradient, values, sums);
+  const auto add = kind == HessianKind::exact ? k.hessian : k.semidefiniteHessian;
+  add(arrays(), x, from, slots.data(), gradient, values, sums);
   return sums;
 }
 

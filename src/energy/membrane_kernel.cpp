@@ -126,9 +126,23 @@ SLENDER_INLINE Stress tensilePart(const Stress& s)
   return {middle + split * difference, middle - split * difference, split * s.s12};
 }
 
+/// Makes of the stress at x what a linear extrapolation of the strain from other points gives: less the response to
+/// the part of the strain that is of second order in the displacement, 1/2 D^T D with its gradient D.
+SLENDER_INLINE void extrapolate(const MembraneArrays& m, int i, const Triangle& t, const double* x, const double* from,
+                                Stress& s)
+{
+  const auto moved = [&](int k) { return gatherPoints(x, m.points[k] + i) - gatherPoints(from, m.points[k] + i); };
+  const Vec3<Pack> d0 = moved(0), e1 = moved(1) - d0, e2 = moved(2) - d0;
+  const Vec3<Pack> d1 = e1 * t.b[1][0] + e2 * t.b[2][0], d2 = e1 * t.b[1][1] + e2 * t.b[2][1];
+  const Pack area = load(m.area + i), g11 = 0.5 * dot(d1, d1), g22 = 0.5 * dot(d2, d2), g12 = dot(d1, d2);
+  s.s11 -= area * (m.c11 * g11 + m.c12 * g22);
+  s.s22 -= area * (m.c12 * g11 + m.c22 * g22);
+  s.s12 -= area * m.c33 * g12;
+}
+
 template <bool Viscous, bool Semidefinite>
-void hessianOf(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values,
-               MembraneSums& sums)
+void hessianOf(const MembraneArrays& m, const double* x, const double* from, const int* slots, double* out,
+               double* values, MembraneSums& sums)
 {
   Totals totals;
   for (int i = 0; i < m.count; i += W)
@@ -136,6 +150,8 @@ void hessianOf(const MembraneArrays& m, const double* x, const int* slots, doubl
     const Triangle t = triangleAt(m, x, i);
     Stress s = stressOf<Viscous>(m, i, t, totals);
     addForces(m, i, t, s, out);
+    if (from)
+      extrapolate(m, i, t, x, from, s);
     if (Semidefinite)
       s = tensilePart(s);
     // d2E/dx_p dx_q = (b_p S b_q) 1 + sum of c_ij times products of the strains' derivatives: b_p1 f1, b_p2 f2, b_p2 f1
@@ -170,17 +186,17 @@ void gradient(const MembraneArrays& m, const double* x, double* out, MembraneSum
 {
   m.rest_strain[0] ? gradientOf<true>(m, x, out, sums) : gradientOf<false>(m, x, out, sums);
 }
-void hessian(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values,
-             MembraneSums& sums)
+void hessian(const MembraneArrays& m, const double* x, const double* from, const int* slots, double* out,
+             double* values, MembraneSums& sums)
 {
-  m.rest_strain[0] ? hessianOf<true, false>(m, x, slots, out, values, sums)
-                   : hessianOf<false, false>(m, x, slots, out, values, sums);
+  m.rest_strain[0] ? hessianOf<true, false>(m, x, from, slots, out, values, sums)
+                   : hessianOf<false, false>(m, x, from, slots, out, values, sums);
 }
-void semidefiniteHessian(const MembraneArrays& m, const double* x, const int* slots, double* out, double* values,
-                         MembraneSums& sums)
+void semidefiniteHessian(const MembraneArrays& m, const double* x, const double* from, const int* slots, double* out,
+                         double* values, MembraneSums& sums)
 {
-  m.rest_strain[0] ? hessianOf<true, true>(m, x, slots, out, values, sums)
-                   : hessianOf<false, true>(m, x, slots, out, values, sums);
+  m.rest_strain[0] ? hessianOf<true, true>(m, x, from, slots, out, values, sums)
+                   : hessianOf<false, true>(m, x, from, slots, out, values, sums);
 }
 
 }   // namespace

@@ -36,9 +36,10 @@ TermSums MembraneTerm::addGradient(const double* x, double* gradient)
   return sumsOf(energy_.addGradient(x, gradient));
 }
 
-TermSums MembraneTerm::addHessian(HessianKind kind, const double* x, double* gradient, double* values)
+TermSums MembraneTerm::addHessian(HessianKind kind, const double* x, double* gradient, double* values,
+                                  const double* from)
 {
-  return sumsOf(energy_.addHessian(kind, x, slots_, gradient, values));
+  return sumsOf(energy_.addHessian(kind, x, slots_, gradient, values, from));
 }
 
 void MembraneTerm::addStrains(const PointVector& x, double part)

@@ -69,11 +69,13 @@ struct Derivatives
     energy.addGradient(pointsOf(x).data(), g.data());
     return matrixOf(g);
   }
-  MatrixXd hessian(const Matrix3Xd& x, HessianKind kind)
+  /// `from`: further arguments of addHessian(), see MembraneEnergy.
+  template <class... From>
+  MatrixXd hessian(const Matrix3Xd& x, HessianKind kind, const From&... from)
   {
     matrix.setZero();
     PointVector g(4 * x.cols(), 0.0);
-    energy.addHessian(kind, pointsOf(x).data(), slots, g.data(), matrix.values());
+    energy.addHessian(kind, pointsOf(x).data(), slots, g.data(), matrix.values(), pointsOf(from).data()...);
     return denseOf(matrix);
   }
 };

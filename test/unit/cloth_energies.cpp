@@ -164,6 +164,58 @@ TEST(Membrane, OneTriangleOfStVenantKirchhoff)
   EXPECT_EQ(cases, 7);
 }
 
+/// The strain that was extrapolated linearly from another configuration, here by central differences, gives the
+/// stresses of the geometric stiffness. All else in the Hessian stays.
+TEST(Membrane, ExtrapolatesStressesOfTheGeometricStiffness)
+{
+  TriangleMesh mesh;
+  mesh.vertices.resize(3, 3);
+  mesh.vertices << 0, 1.2, 0.3, 0, 0.1, 0.9, 0, 0, 0;
+  mesh.triangles = Eigen::Vector3i(0, 1, 2);
+  const MembraneEnergy e(mesh, {50, 12, 40, 18});
+  Eigen::Matrix2d edges;
+  edges << 1.2, 0.3, 0.1, 0.9;
+  Eigen::Matrix<double, 3, 2> b;   // gradients of the shape functions
+  b.bottomRows<2>() = edges.inverse();
+  b.row(0) = -b.row(1) - b.row(2);
+
+  Random random(11);
+  Matrix3Xd from = mesh.vertices, x = mesh.vertices;
+  for (int i = 0; i < 3; ++i)
+  {
+    from.col(i) += random.vector(0.2);
+    x.col(i) += random.vector(0.2);
+  }
+  const auto strain = [&](const Matrix3Xd& at) {
+    std::vector<double> g[3];
+    double* out[3];
+    for (int k = 0; k < 3; ++k)
+    {
+      g[k].resize(static_cast<std::size_t>(e.paddedCount()));
+      out[k] = g[k].data();
+    }
+    e.strains(pointsOf(at).data(), out);
+    return Eigen::Vector3d(g[0][0], g[1][0], g[2][0]);
+  };
+  // exact, because strains are quadratic
+  const Eigen::Vector3d rate = 0.5 * (strain(from + (x - from)) - strain(from - (x - from)));
+  const Eigen::Vector3d second = strain(from) + rate - strain(x);   // of the extrapolated strain, less the present one
+  Eigen::Matrix2d stress;
+  stress(0, 0) = 50 * second[0] + 12 * second[1];
+  stress(1, 1) = 12 * second[0] + 40 * second[1];
+  stress(0, 1) = stress(1, 0) = 18 * second[2];
+  const Eigen::Matrix3d spread = e.area(0) * b * stress * b.transpose();
+
+  Derivatives<MembraneEnergy> d(e, 3, mesh.triangles);
+  const MatrixXd change = d.hessian(x, HessianKind::exact, from) - d.hessian(x, HessianKind::exact);
+  for (int p = 0; p < 3; ++p)
+    for (int q = 0; q < 3; ++q)
+      EXPECT_LT((change.block<3, 3>(3 * p, 3 * q) - spread(p, q) * Eigen::Matrix3d::Identity()).norm(), 1e-11)
+          << p << " " << q;   // rounding of moduli of 50
+  EXPECT_GT(spread.norm(), 0.1);
+  EXPECT_EQ(d.hessian(x, HessianKind::exact, x), d.hessian(x, HessianKind::exact));
+}
+
 TEST(Membrane, RefusesBadModuli)
 {
   EXPECT_THROW(isotropicMembrane(-1, 0.3, 1e-3), std::invalid_argument);

@@ -208,8 +208,9 @@ TEST_P(ClothPartDerivatives, AreThoseOfTheEnergy)
   driver.accept();
   part.takeDirection(d.data());   // small: from now on the Hessian is the exact one
   driver.moveAlong(1.0);
-  ASSERT_TRUE(driver.evaluate(true).inertia.positiveDefinite());
   driver.accept();
+  driver.accept();   // no stress is extrapolated from an iterate to itself
+  ASSERT_TRUE(driver.evaluate(true).inertia.positiveDefinite());
   const VectorXd gradient = partGradient(part);
   ASSERT_GT(gradient.norm(), 0.0);
 

@@ -19,7 +19,7 @@ public:
   void setPattern(const BlockMatrix& matrix) override { slots_ = energy_.slotsIn(matrix); }
   TermSums value(const double* x) override { return {energy_.energy(x)}; }
   TermSums addGradient(const double* x, double* gradient) override { return {energy_.addGradient(x, gradient)}; }
-  TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values) override
+  TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values, const double*) override
   {
     return {energy_.addHessian(kind, x, slots_, gradient, values)};
   }

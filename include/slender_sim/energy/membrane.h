@@ -51,9 +51,9 @@ public:
   void strains(const double* x, double* const* strains) const { membraneKernels().strains(arrays(), x, strains); }
   MembraneSums energy(const double* x) const;
   MembraneSums addGradient(const double* x, double* gradient) const;
-  /// `slots` from slotsIn().
+  /// `slots` from slotsIn(); `from`: see PointTerm.
   MembraneSums addHessian(HessianKind kind, const double* x, const std::vector<int>& slots, double* gradient,
-                          double* values) const;
+                          double* values, const double* from = nullptr) const;
   std::vector<int> slotsIn(const BlockMatrix& matrix) const;
 
 private:

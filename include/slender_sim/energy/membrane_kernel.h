@@ -31,12 +31,13 @@ struct MembraneKernels
   /// Adds dE/dx.
   void (*gradient)(const MembraneArrays& membrane, const double* x, double* gradient, MembraneSums& sums);
   /// Adds dE/dx and the second derivatives to the blocks of a matrix (6 slots per triangle, see BlockMatrix::slots).
-  void (*hessian)(const MembraneArrays& membrane, const double* x, const int* slots, double* gradient, double* values,
-                  MembraneSums& sums);
+  /// `from`: null, or points from which the stresses in the second derivatives are extrapolated, see PointTerm.
+  void (*hessian)(const MembraneArrays& membrane, const double* x, const double* from, const int* slots,
+                  double* gradient, double* values, MembraneSums& sums);
   /// The same with a positive semidefinite matrix not below the exact one: compressive principal stresses are left out
   /// of it.
-  void (*semidefiniteHessian)(const MembraneArrays& membrane, const double* x, const int* slots, double* gradient,
-                              double* values, MembraneSums& sums);
+  void (*semidefiniteHessian)(const MembraneArrays& membrane, const double* x, const double* from, const int* slots,
+                              double* gradient, double* values, MembraneSums& sums);
 };
 
 namespace baseline {

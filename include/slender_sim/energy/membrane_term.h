@@ -17,7 +17,7 @@ public:
   void setPattern(const BlockMatrix& matrix) override { slots_ = energy_.slotsIn(matrix); }
   TermSums value(const double* x) override;
   TermSums addGradient(const double* x, double* gradient) override;
-  TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values) override;
+  TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values, const double* from) override;
   void takeStrains(const StrainReference& at) override;
   void setResponse(double ratio) override;
 

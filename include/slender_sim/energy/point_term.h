@@ -68,8 +68,13 @@ public:
   /// Adds the gradient to `gradient` [N].
   virtual TermSums addGradient(const double* x, double* gradient) = 0;
   /// Adds the gradient, and the Hessian to the values of the matrix of setPattern() [N/m]. `kind` chooses the exact
-  /// Hessian or a positive semidefinite one that is not below it, for example that of Gauss and Newton.
-  virtual TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values) = 0;
+  /// Hessian or a positive semidefinite one that is not below it, for example that of Gauss and Newton. `from`: null,
+  /// or the iterate of Newton's method before x. A term may then take for its geometric stiffness the stresses that
+  /// were extrapolated linearly from there, as a method with unknown stresses has them: they lack the spurious part of
+  /// second order that a turn of stiff elements causes [Magisano, Leonetti, Garcea, Computer Methods in Applied
+  /// Mechanics and Engineering 313 (2017), 986].
+  virtual TermSums addHessian(HessianKind kind, const double* x, double* gradient, double* values,
+                              const double* from = nullptr) = 0;
 
   /// Keeps the strains of these points, at which viscous forces are zero.
   virtual void takeStrains(const StrainReference& at) = 0;

@@ -16,7 +16,7 @@ public:
   const PointMatrix* constantMatrix() const override { return &matrix_; }
   TermSums value(const double* x) override;
   TermSums addGradient(const double* x, double* gradient) override;
-  TermSums addHessian(HessianKind, const double* x, double* gradient, double*) override
+  TermSums addHessian(HessianKind, const double* x, double* gradient, double*, const double*) override
   {
     return addGradient(x, gradient);
   }
