@@ -111,7 +111,7 @@ void addSolids(const Simulation& simulation, std::vector<FieldTable>& out)
 {
   const SceneConfig& scene = simulation.config();
   const SceneState& state = simulation.state();
-  const SolidLoads loads = simulation.world().solidLoads();
+  const ContactLoads loads = simulation.world().contactLoads();
   const bool known = std::none_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
     return cloth.contact && cloth.contact->solids && cloth.contact->method == ContactMethod::impulses;
   });
