@@ -4,6 +4,7 @@
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
+#include "scene/reader/yaml_cursor.h"
 #include "slender_sim/node/scene_node.h"
 
 namespace slender {
@@ -193,9 +194,7 @@ void SceneNode::remindOfInputs()
 {
   if (mode_ != Mode::running || replay_ || ros::WallTime::now() < next_input_reminder_)
     return;
-  std::string waits;
-  for (const std::string& body : inputs_->unheardBodies())
-    waits += (waits.empty() ? "" : ", ") + body;
+  const std::string waits = joinWords(inputs_->unheardBodies());
   if (!waits.empty())
   {
     const std::string& stranger = inputs_->drops().last(Drop::unknown_name);
@@ -207,9 +206,7 @@ void SceneNode::remindOfInputs()
   if (!told_of_topics_ && total_.steps > 0 && total_.simulated > kClockReminder / 2)
   {
     told_of_topics_ = true;
-    std::string topics;
-    for (const std::string& topic : inputs_->unheardTopics())
-      topics += (topics.empty() ? "" : ", ") + topic;
+    const std::string topics = joinWords(inputs_->unheardTopics());
     if (!topics.empty())
       ROS_INFO("%s: nobody has published a pose yet for %s; what follows it stays where it is",
                nh_priv_.getNamespace().c_str(), topics.c_str());
@@ -234,6 +231,30 @@ std::string SceneNode::clockWentBack() const
   return behind > kBehind ? "waits for /clock, which is " + std::to_string(behind) +
                                 " s behind the simulated time; start the node anew if it went back"
                           : "";
+}
+
+void SceneNode::addLimits(DiagnosticStatus& status) const
+{
+  const auto report = [&status](std::uint8_t level, const std::string& message) {
+    status.message += (status.message.empty() ? "" : "; ") + message;
+    if (level > status.level)
+      status.level = level;
+  };
+  const std::vector<std::string> lasting = limits_->lasting();
+  if (!limits_->held().empty())
+    report(DiagnosticStatus::ERROR, "inputs are held (call ~pause with false to let them go on): " + limits_->held());
+  else if (!lasting.empty())
+    report(DiagnosticStatus::WARN,
+           lasting.front() + (lasting.size() > 1 ? " and " + std::to_string(lasting.size() - 1) + " more limits" : ""));
+  const std::vector<std::string>& inside = crossings_->heldInside();
+  if (!inside.empty())
+    report(DiagnosticStatus::WARN, inside.front());
+  for (const std::string& pair : inside)
+    add(status, "held inside", pair);
+  add(status, "limits exceeded now", std::uint64_t{lasting.size()});
+  add(status, "limits exceeded so far", std::to_string(limits_->count()));
+  if (!lasting.empty())
+    add(status, "last limit exceeded", lasting.back());
 }
 
 DiagnosticStatus SceneNode::simulationStatus() const
