@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
@@ -63,9 +62,7 @@ double shortestStep(double span_ns, double steps)
 {
   for (int digits = 1; digits < 17; ++digits)
   {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.*g", digits, 1e-9 * span_ns / steps);
-    const double step = std::strtod(text, nullptr);
+    const double step = std::strtod(shortNumber(1e-9 * span_ns / steps, digits).c_str(), nullptr);
     if (std::abs(1e9 * step * steps - span_ns) <= 1.0)
       return step;
   }

@@ -101,19 +101,20 @@ void addStart(const Simulation& simulation, DiagnosticStatus& status)
 void addTracking(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
 {
   double error = 0.0, force = 0.0, refused = 0.0;
+  const auto takeForces = [&force](const GuideState& guide) {
+    force = std::max(force, guide.forces.cols() > 0 ? guide.forces.colwise().norm().maxCoeff() : 0.0);
+  };
   for (std::size_t k = 0; k < simulation.state().cloth_guides.size(); ++k)
   {
     const TrackingError now = simulation.trackingError(static_cast<int>(k));
     error = std::max(error, now.met);
     refused = std::max(refused, now.at_bound);
-    const Eigen::Matrix3Xd& forces = simulation.state().cloth_guides[k].forces;
-    force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+    takeForces(simulation.state().cloth_guides[k]);
   }
   for (std::size_t r = 0; r < simulation.state().rod_guides.size(); ++r)
   {
     error = std::max(error, simulation.rodTrackingError(static_cast<int>(r)));
-    const Eigen::Matrix3Xd& forces = simulation.state().rod_guides[r].forces;
-    force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+    takeForces(simulation.state().rod_guides[r]);
   }
   add(status, "constraint residual [m]", error);
   add(status, "worst constraint residual over size", recent.tracking_error);
