@@ -5,7 +5,8 @@ slender_compile_together(slender_sim_node <ros/ros.h> <Eigen/Dense>)
 add_dependencies(slender_sim_node ${PROJECT_NAME}_generate_messages_cpp)
 target_compile_options(slender_sim_node PRIVATE -O1)
 target_include_directories(slender_sim_node PUBLIC
-  $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS})
+  $<BUILD_INTERFACE:${CATKIN_DEVEL_PREFIX}/include> ${catkin_INCLUDE_DIRS}
+  PRIVATE ${PROJECT_SOURCE_DIR}/src)
 target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES} PRIVATE yaml-cpp)
 
 foreach(node scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player rviz_on_scene)

@@ -1,7 +1,6 @@
 #include "slender_sim/cloth/cloth_group.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <sstream>
 #include <stdexcept>

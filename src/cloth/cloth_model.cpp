@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>
 
+#include "slender_sim/dynamics/failure_place.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/geometry/mesh_defects.h"
 
@@ -66,12 +66,7 @@ void checkUndeformed(const ClothModel& model)
                                 std::to_string(model.undeformed.cols()));
 }
 
-std::string degrees(double radians)
-{
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g degrees", radians * 180 / M_PI);
-  return text;
-}
+std::string degrees(double radians) { return shortNumber(radians * 180 / M_PI, 3) + " degrees"; }
 
 }   // namespace
 

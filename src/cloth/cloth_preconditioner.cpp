@@ -1,7 +1,6 @@
 #include "cloth_preconditioner.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "cloth_linear_solver.h"
 #include "slender_sim/dynamics/equilibrium_search.h"

@@ -1,6 +1,5 @@
 // Averages that are prescribed, and contact.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "slender_sim/cloth/cloth_group.h"

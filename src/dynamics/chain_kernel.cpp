@@ -1,18 +1,11 @@
 // Compiled once per instruction set (SLENDER_ISA). Plain arrays only; nothing here may be emitted under a shared name.
 #include "slender_sim/dynamics/chain_kernel.h"
 
+#include "energy/pack.h"
+
 namespace slender {
 namespace SLENDER_ISA {
 namespace {
-
-using Pack = double __attribute__((vector_size(64)));
-using PackU __attribute__((aligned(8), may_alias)) = Pack;
-// Clang overlooks aligned() beside vector_size()
-static_assert(alignof(PackU) == 8, "loads and stores may be anywhere");
-constexpr int W = 8;
-
-inline __attribute__((always_inline)) Pack load(const double* p) { return *reinterpret_cast<const PackU*>(p); }
-inline __attribute__((always_inline)) void store(double* p, Pack v) { *reinterpret_cast<PackU*>(p) = v; }
 
 /// The node after the last edge of a closed chain is the first one again.
 void closeNodes(const ChainArrays& r)
@@ -59,7 +52,7 @@ double constraints(const ChainArrays& r)
       after += s * load(r.direction[k] + j + 1);
     }
     const Pack error = (square - 1.0) * active;
-    const Pack size = error < 0.0 ? -error : error;
+    const Pack size = absolute(error);
     worst = worst < size ? size : worst;
     poison += error * 0.0;   // a comparison forgets what is not a number
     store(r.c + j, 0.5 * error * load(r.rest_length + j));

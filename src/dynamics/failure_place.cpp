@@ -20,16 +20,20 @@ std::string Largest::text(const std::string& unit) const
 {
   if (!std::isfinite(value_))
     return "infinite";
-  char number[40];
-  std::snprintf(number, sizeof number, "%.3g", value_);
-  return number + (unit.empty() ? unit : " " + unit);
+  return shortNumber(value_, 3) + (unit.empty() ? unit : " " + unit);
+}
+
+std::string shortNumber(double value, int digits)
+{
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
 }
 
 std::string metres(const Eigen::Vector3d& position)
 {
-  char text[120];
-  std::snprintf(text, sizeof text, "(%.4g, %.4g, %.4g) m", position.x(), position.y(), position.z());
-  return text;
+  return "(" + shortNumber(position.x(), 4) + ", " + shortNumber(position.y(), 4) + ", " +
+         shortNumber(position.z(), 4) + ") m";
 }
 
 }   // namespace slender

@@ -1,7 +1,8 @@
 #include "slender_sim/dynamics/step_report.h"
 
 #include <algorithm>
-#include <cstdio>
+
+#include "slender_sim/dynamics/failure_place.h"
 
 namespace slender {
 
@@ -58,11 +59,6 @@ const char* toString(StepFailure failure)
   return "unknown";
 }
 
-std::string milliseconds(double seconds)
-{
-  char text[40];
-  std::snprintf(text, sizeof text, "%.3g ms", 1e3 * seconds);
-  return text;
-}
+std::string milliseconds(double seconds) { return shortNumber(1e3 * seconds, 3) + " ms"; }
 
 }   // namespace slender

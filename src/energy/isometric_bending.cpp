@@ -1,6 +1,5 @@
 #include "slender_sim/energy/isometric_bending.h"
 
-#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <vector>

@@ -1,7 +1,6 @@
 #include "slender_sim/geometry/mesh_shapes.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <random>

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "hermite.h"
 #include "slender_sim/geometry/rotation.h"

@@ -9,12 +9,8 @@ namespace {
 
 const BandKernels& kernels()
 {
-#ifdef SLENDER_X86_KERNELS
-  static const BandKernels& table = pickKernels(baseline::kBandKernels, avx2::kBandKernels, avx512::kBandKernels);
+  static const BandKernels& table = SLENDER_PICK_KERNELS(kBandKernels);
   return table;
-#else
-  return baseline::kBandKernels;
-#endif
 }
 
 }   // namespace

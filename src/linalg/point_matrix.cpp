@@ -1,6 +1,5 @@
 #include "slender_sim/linalg/point_matrix.h"
 
-#include <cmath>
 #include <stdexcept>
 
 #include "slender_sim/linalg/point_kernel.h"

@@ -54,18 +54,10 @@ struct SparseCholesky::Impl
 
   cholmod_sparse view()
   {
-    cholmod_sparse a{};
-    a.nrow = a.ncol = starts.size() - 1;
-    a.nzmax = rows.size();
-    a.p = starts.data();
-    a.i = rows.data();
+    cholmod_sparse a = patternView(starts, rows);
     a.x = values.data();
-    a.stype = -1;
-    a.itype = CHOLMOD_INT;
     a.xtype = CHOLMOD_REAL;
     a.dtype = CHOLMOD_DOUBLE;
-    a.sorted = 1;
-    a.packed = 1;
     return a;
   }
 

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <new>
 #include <set>
 #include <vector>
@@ -16,6 +14,7 @@
 #include <rosbag/view.h>
 #include <std_msgs/String.h>
 
+#include "scene/reader/yaml_cursor.h"
 #include "slender_sim/Fields.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_messages.h"
@@ -27,21 +26,6 @@
 namespace slender {
 namespace {
 
-template <class Vectors>
-Eigen::Matrix3Xd columns(const Vectors& from, std::size_t first, std::size_t last)
-{
-  Eigen::Matrix3Xd out(3, static_cast<Eigen::Index>(last - first));
-  for (std::size_t i = first; i < last; ++i)
-    out.col(static_cast<Eigen::Index>(i - first)) << from[i].x, from[i].y, from[i].z;
-  return out;
-}
-
-template <class Vectors>
-Eigen::Matrix3Xd columns(const Vectors& from)
-{
-  return columns(from, 0, from.size());
-}
-
 Eigen::VectorXd numbers(const std::vector<double>& from)
 {
   return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<Eigen::Index>(from.size()));
@@ -51,7 +35,7 @@ std::vector<Eigen::Quaterniond> quaternions(const std::vector<geometry_msgs::Qua
 {
   std::vector<Eigen::Quaterniond> out;
   for (const geometry_msgs::Quaternion& q : from)
-    out.emplace_back(q.w, q.x, q.y, q.z);
+    out.push_back(fromMessage(q));
   return out;
 }
 
@@ -59,15 +43,6 @@ bool allFinite(const std::vector<Eigen::Quaterniond>& all)
 {
   return std::all_of(all.begin(), all.end(), [](const Eigen::Quaterniond& q) { return q.coeffs().allFinite(); });
 }
-
-/// Not normalized: tables show what was recorded.
-Pose poseOf(const geometry_msgs::Pose& from)
-{
-  const geometry_msgs::Quaternion& q = from.orientation;
-  return {fromMessage(from.position), Eigen::Quaterniond(q.w, q.x, q.y, q.z)};
-}
-
-Eigen::Vector3d vectorOf(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
 
 void require(bool fits, const std::string& what)
 {
@@ -87,9 +62,7 @@ double shortestStep(double span_ns, double steps)
 {
   for (int digits = 1; digits < 17; ++digits)
   {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.*g", digits, 1e-9 * span_ns / steps);
-    const double step = std::strtod(text, nullptr);
+    const double step = std::strtod(shortNumber(1e-9 * span_ns / steps, digits).c_str(), nullptr);
     if (std::abs(1e9 * step * steps - span_ns) <= 1.0)
       return step;
   }
@@ -211,13 +184,14 @@ void BagReader::Contents::choosePrefix(const std::string& topic_namespace)
     throw BagError(path +
                    ": holds no states of slender_sim; record with simulate --bag, with ~record_bag of a node, or at "
                    "least its topic `state`");
-  std::string wanted = topic_namespace, list;
+  std::string wanted = topic_namespace;
   while (!wanted.empty() && wanted.back() == '/')
     wanted.pop_back();
-  for (const std::string& prefix_found : found)
-    list += (list.empty() ? "" : ", ") + (prefix_found.empty() ? std::string("/") : prefix_found);
+  std::vector<std::string> names(found.begin(), found.end());
+  if (names.front().empty())
+    names.front() = "/";
   if (topic_namespace.empty() ? found.size() > 1 : found.count(wanted) == 0)
-    throw BagError(path + ": holds the states of " + list + "; choose one with --namespace");
+    throw BagError(path + ": holds the states of " + joinWords(names) + "; choose one with --namespace");
   prefix = (topic_namespace.empty() ? *found.begin() : wanted) + "/";
 }
 
@@ -280,7 +254,7 @@ void BagReader::Contents::openStreams()
         require(m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(),
                 "grasp_states");
         for (std::size_t g = 0; g < m.name.size(); ++g)
-          grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, poseOf(m.pose[g])};
+          grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, recordedPose(m.pose[g])};
       });
     else if (name.compare(0, 7, "grasps/") == 0 && name.size() > 14 &&
              name.compare(name.size() - 7, 7, "/wrench") == 0 && type == "WrenchStamped")
@@ -288,7 +262,7 @@ void BagReader::Contents::openStreams()
       const std::string of = name.substr(7, name.size() - 14);
       streams.push_back(std::make_unique<TopicStream<geometry_msgs::WrenchStamped>>(
           bag, topic, connection->datatype, [this, of](const auto& m) {
-            grasp(of).wrench = {vectorOf(m.wrench.force), vectorOf(m.wrench.torque)};
+            grasp(of).wrench = {fromMessage(m.wrench.force), fromMessage(m.wrench.torque)};
             if (endsWith(m.header.frame_id, "/grasps/" + of))
               own_axes.push_back(of);
           }));
@@ -364,17 +338,17 @@ void BagReader::Contents::add(const slender_sim::RodState& rod)
   step = rod.step;
   epoch = rod.epoch;
   step_known = true;
-  out->rods.push_back({rod.name, rod.closed != 0, columns(rod.nodes), columns(rod.velocities), quaternions(rod.frames),
-                       numbers(rod.twists), numbers(rod.radii),
+  out->rods.push_back({rod.name, rod.closed != 0, columnsOf(rod.nodes), columnsOf(rod.velocities),
+                       quaternions(rod.frames), numbers(rod.twists), numbers(rod.radii),
                        numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
   const RodSnapshot& read = out->rods.back();
   requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.twist.allFinite() &&
                     read.radius_a.allFinite() && read.radius_b.allFinite(),
                 "rod " + rod.name);
-  require(
-      !scene || rod.guide_nodes.empty() ||
-          appendFunctions(*scene, rod.name, "", columns(rod.guide_nodes), columns(rod.guide_forces), out->functions),
-      "state (what " + rod.name + " tracks)");
+  require(!scene || rod.guide_nodes.empty() ||
+              appendFunctions(*scene, rod.name, "", columnsOf(rod.guide_nodes), columnsOf(rod.guide_forces),
+                              out->functions),
+          "state (what " + rod.name + " tracks)");
 }
 
 void BagReader::Contents::add(const slender_sim::ThreadState& thread)
@@ -386,8 +360,9 @@ void BagReader::Contents::add(const slender_sim::ThreadState& thread)
   step = thread.step;
   epoch = thread.epoch;
   step_known = true;
-  out->threads.push_back({thread.name, thread.thread_id, thread.ids, columns(thread.nodes), columns(thread.velocities),
-                          thread.deposited, quaternions(thread.frames), numbers(thread.radii)});
+  out->threads.push_back({thread.name, thread.thread_id, thread.ids, columnsOf(thread.nodes),
+                          columnsOf(thread.velocities), thread.deposited, quaternions(thread.frames),
+                          numbers(thread.radii)});
   const ThreadSnapshot& read = out->threads.back();
   requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.radius.allFinite(),
                 "thread " + thread.name);
@@ -422,7 +397,7 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
   {
     const auto [first, last] = range(cloths.offsets, k, cloths.vertices.size());
     ClothSnapshot cloth{
-        cloths.names[k], columns(cloths.vertices, first, last), columns(cloths.velocities, first, last), {}};
+        cloths.names[k], columnsOf(cloths.vertices, first, last), columnsOf(cloths.velocities, first, last), {}};
     requireFinite(cloth.x.allFinite() && cloth.v.allFinite(), "cloth " + cloth.name);
     if (const slender_sim::MeshStamped* found = meshOf(cloths))
     {
@@ -440,8 +415,8 @@ void BagReader::Contents::add(const slender_sim::ClothState& cloths)
     const auto [force, force_end] = range(cloths.function_offsets, k, cloths.guide_forces.size());
     require(!scene || guide == guide_end ||
                 appendFunctions(*scene, cloths.names[k], cloths.function_sets[k],
-                                columns(cloths.guide_vertices, guide, guide_end),
-                                columns(cloths.guide_forces, force, force_end), out->functions),
+                                columnsOf(cloths.guide_vertices, guide, guide_end),
+                                columnsOf(cloths.guide_forces, force, force_end), out->functions),
             "state (what " + cloths.names[k] + " tracks)");
   }
 }
@@ -451,8 +426,8 @@ void BagReader::Contents::add(const slender_sim::BodyStates& states, std::vector
   require(states.pose.size() == states.name.size() && states.twist.size() == states.name.size(), "body_states");
   for (std::size_t b = 0; b < states.name.size(); ++b)
     solids.push_back({states.name[b],
-                      poseOf(states.pose[b]),
-                      {vectorOf(states.twist[b].linear), vectorOf(states.twist[b].angular)}});
+                      recordedPose(states.pose[b]),
+                      {fromMessage(states.twist[b].linear), fromMessage(states.twist[b].angular)}});
 }
 
 void BagReader::Contents::add(const slender_sim::Fields& fields)

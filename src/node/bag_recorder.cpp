@@ -41,22 +41,16 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
 void BagRecorder::nameTopics(const Simulation& simulation)
 {
   const SceneTopics topics(simulation);
-  rods_topic_ = prefix_ + topics.rods + "state";
-  threads_topic_ = prefix_ + topics.threads + "state";
-  cloths_topic_ = prefix_ + topics.cloths + "state";
-  mesh_topic_ = prefix_ + topics.cloths + "mesh";
-  scene_topic_ = prefix_ + "scene";
-  inputs_topic_ = prefix_ + "inputs";
-  bodies_topic_ = prefix_ + "body_states";
-  grasps_topic_ = prefix_ + "grasp_states";
-  obstacles_topic_ = prefix_ + "obstacle_states";
-  fields_topic_ = prefix_ + "fields";
+  rods_topic_ = topics.rods + "state";
+  threads_topic_ = topics.threads + "state";
+  cloths_topic_ = topics.cloths + "state";
+  mesh_topic_ = topics.cloths + "mesh";
   wrench_topics_.clear();
   nozzle_topics_.clear();
   for (const std::string& name : topics.grasps)
-    wrench_topics_.push_back(prefix_ + "grasps/" + name + "/wrench");
+    wrench_topics_.push_back("grasps/" + name + "/wrench");
   for (const std::string& nozzle : topics.nozzles)
-    nozzle_topics_.push_back(prefix_ + nozzle + "nozzle/wrench");
+    nozzle_topics_.push_back(nozzle + "nozzle/wrench");
 }
 
 BagRecorder::~BagRecorder()
@@ -98,7 +92,7 @@ void BagRecorder::write(const std::string& topic, const ros::Time& stamp, const 
 {
   try
   {
-    bag_->write(topic, stamp, message);
+    bag_->write(prefix_ + topic, stamp, message);
   }
   catch (const rosbag::BagException& e)
   {
@@ -110,12 +104,12 @@ void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
 {
   std_msgs::String message;
   message.data = yaml;
-  write(scene_topic_, stamp, message);
+  write("scene", stamp, message);
 }
 
 void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { write(mesh_topic_, mesh.header.stamp, mesh); }
 
-void BagRecorder::recordInput(const slender_sim::Input& input) { write(inputs_topic_, input.header.stamp, input); }
+void BagRecorder::recordInput(const slender_sim::Input& input) { write("inputs", input.header.stamp, input); }
 
 void BagRecorder::record(const SceneMessages& messages)
 {
@@ -128,15 +122,15 @@ void BagRecorder::record(const SceneMessages& messages)
   for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
     write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
   if (!messages.bodies.name.empty())
-    write(bodies_topic_, messages.bodies.header.stamp, messages.bodies);
+    write("body_states", messages.bodies.header.stamp, messages.bodies);
   for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
     write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
   if (!messages.grasps.name.empty())
-    write(grasps_topic_, messages.grasps.header.stamp, messages.grasps);
+    write("grasp_states", messages.grasps.header.stamp, messages.grasps);
   if (!messages.obstacles.name.empty())
-    write(obstacles_topic_, messages.obstacles.header.stamp, messages.obstacles);
+    write("obstacle_states", messages.obstacles.header.stamp, messages.obstacles);
   if (!messages.fields.tables.empty())
-    write(fields_topic_, messages.fields.header.stamp, messages.fields);
+    write("fields", messages.fields.header.stamp, messages.fields);
 }
 
 void BagRecorder::close()

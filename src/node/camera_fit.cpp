@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Geometry>
 #include <yaml-cpp/yaml.h>
@@ -34,11 +33,9 @@ bool isShape(const Marker& marker)
 /// Appends the points of a marker, or the corners of its box if it has no points.
 void append(const Marker& marker, Points& points)
 {
-  const geometry_msgs::Quaternion& q = marker.pose.orientation;
-  const Eigen::Quaterniond turn(q.w, q.x, q.y, q.z);
+  const Eigen::Quaterniond turn = fromMessage(marker.pose.orientation);
   const bool turned = turn.norm() > 0.5;
-  const Eigen::Vector3d place = fromMessage(marker.pose.position),
-                        scale(marker.scale.x, marker.scale.y, marker.scale.z);
+  const Eigen::Vector3d place = fromMessage(marker.pose.position), scale = fromMessage(marker.scale);
   const auto add = [&](const Eigen::Vector3d& p) {
     points.push_back(place + (turned ? Eigen::Vector3d(turn.normalized() * p) : p));
   };

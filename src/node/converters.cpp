@@ -102,6 +102,13 @@ geometry_msgs::Twist toMessage(const Twist& twist)
 }
 
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
+Eigen::Vector3d fromMessage(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
+Eigen::Quaterniond fromMessage(const geometry_msgs::Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
+
+Pose recordedPose(const geometry_msgs::Pose& message)
+{
+  return {fromMessage(message.position), fromMessage(message.orientation)};
+}
 
 namespace {
 
@@ -113,7 +120,7 @@ PoseFault checked(const Eigen::Vector3d& p, const geometry_msgs::Quaternion& q, 
   if (std::abs(c.norm() - 1.0) > 0.01)
     return PoseFault::bad_quaternion;
   X.position = p;
-  X.orientation = Eigen::Quaterniond(q.w, q.x, q.y, q.z).normalized();
+  X.orientation = fromMessage(q).normalized();
   return PoseFault::none;
 }
 
@@ -126,14 +133,12 @@ PoseFault fromMessage(const geometry_msgs::Pose& message, Pose& X)
 
 PoseFault fromMessage(const geometry_msgs::Transform& message, Pose& X)
 {
-  const geometry_msgs::Vector3& t = message.translation;
-  return checked({t.x, t.y, t.z}, message.rotation, X);
+  return checked(fromMessage(message.translation), message.rotation, X);
 }
 
-bool isFinite(const geometry_msgs::Twist& t)
+bool isFinite(const geometry_msgs::Twist& twist)
 {
-  return std::isfinite(t.linear.x) && std::isfinite(t.linear.y) && std::isfinite(t.linear.z) &&
-         std::isfinite(t.angular.x) && std::isfinite(t.angular.y) && std::isfinite(t.angular.z);
+  return fromMessage(twist.linear).allFinite() && fromMessage(twist.angular).allFinite();
 }
 
 void toMessage(const RodModel& model, const RodState& state, slender_sim::RodState& out)

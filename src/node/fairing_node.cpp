@@ -16,9 +16,7 @@ TriangleMesh meshOf(const slender_sim::FairMesh::Request& request)
     throw std::invalid_argument("triangles: " + std::to_string(request.triangles.size()) +
                                 " numbers; must be three per triangle");
   TriangleMesh mesh;
-  mesh.vertices.resize(3, static_cast<Eigen::Index>(request.vertices.size()));
-  for (std::size_t v = 0; v < request.vertices.size(); ++v)
-    mesh.vertices.col(static_cast<Eigen::Index>(v)) = fromMessage(request.vertices[v]);
+  mesh.vertices = columnsOf(request.vertices);
   mesh.triangles.resize(3, static_cast<Eigen::Index>(request.triangles.size() / 3));
   for (std::size_t k = 0; k < request.triangles.size(); ++k)
   {

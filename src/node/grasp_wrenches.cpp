@@ -68,9 +68,8 @@ void GraspWrenches::publish(const ros::Publisher& publisher, const Channel& chan
   if (!options_.world)
   {
     message.header.frame_id = channel.frame;
-    const Eigen::Quaterniond to_grasp(pose.orientation.w, -pose.orientation.x, -pose.orientation.y,
-                                      -pose.orientation.z);
-    const auto turn = [&](geometry_msgs::Vector3& v) { v = toVector3(to_grasp * Eigen::Vector3d(v.x, v.y, v.z)); };
+    const Eigen::Quaterniond to_grasp = fromMessage(pose.orientation).conjugate();
+    const auto turn = [&](geometry_msgs::Vector3& v) { v = toVector3(to_grasp * fromMessage(v)); };
     turn(message.wrench.force);
     turn(message.wrench.torque);
   }

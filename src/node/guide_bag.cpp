@@ -10,6 +10,7 @@
 #include <rosbag/view.h>
 #include <sensor_msgs/PointCloud2.h>
 
+#include "scene/reader/yaml_cursor.h"
 #include "slender_sim/BodyStates.h"
 #include "slender_sim/ClothState.h"
 #include "slender_sim/node/converters.h"
@@ -30,26 +31,24 @@ std::string topicOf(rosbag::Bag& bag, const BagSource& source)
 {
   const std::set<std::string> types =
       source.bodies ? std::set<std::string>{kBodies} : std::set<std::string>{kPoints, kCloths};
-  std::string all, good;
+  std::vector<std::string> all;
   std::set<std::string> fitting;
   for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections())
   {
-    all += (all.empty() ? "" : ", ") + connection->topic + " (" + connection->datatype + ")";
+    all.push_back(connection->topic + " (" + connection->datatype + ")");
     if (types.count(connection->datatype) &&
         (source.topic.empty() || slashed(connection->topic) == slashed(source.topic)))
       fitting.insert(connection->topic);
   }
-  for (const std::string& topic : fitting)
-    good += (good.empty() ? "" : ", ") + topic;
-  for (const std::string& type : types)
-    if (fitting.empty())
-      good += (good.empty() ? "" : " or ") + type;
   if (fitting.empty())
-    throw std::runtime_error("has no messages " + good + (source.topic.empty() ? "" : " on " + source.topic) +
-                             "; it has: " + (all.empty() ? "nothing" : all));
+    throw std::runtime_error(std::string("has no messages ") +
+                             (source.bodies ? kBodies : std::string(kPoints) + " or " + kCloths) +
+                             (source.topic.empty() ? "" : " on " + source.topic) +
+                             "; it has: " + (all.empty() ? "nothing" : joinWords(all)));
   if (fitting.size() > 1)
-    throw std::runtime_error("several of its topics could be the guide: " + good +
-                             "; name one of them: {file: ..., topic: ...}");
+    throw std::runtime_error(
+        "several of its topics could be the guide: " + joinWords({fitting.begin(), fitting.end()}) +
+        "; name one of them: {file: ..., topic: ...}");
   return *fitting.begin();
 }
 
@@ -57,23 +56,16 @@ std::string topicOf(rosbag::Bag& bag, const BagSource& source)
 Eigen::Matrix3Xd pointsOf(const slender_sim::ClothState& message, const std::string& object)
 {
   const auto found = std::find(message.names.begin(), message.names.end(), object);
-  std::string names;
-  for (const std::string& name : message.names)
-    names += (names.empty() ? "" : ", ") + name;
   if (found == message.names.end() && message.names.size() != 1)
-    throw std::runtime_error("has no cloth " + object + " but " + names +
+    throw std::runtime_error("has no cloth " + object + " but " + joinWords(message.names) +
                              "; name one of them: {file: ..., cloth: ...}");
   const std::size_t k = found == message.names.end() ? 0 : static_cast<std::size_t>(found - message.names.begin());
   const auto slice = [k](const auto& offsets, const std::vector<geometry_msgs::Point>& points) {
-    Eigen::Matrix3Xd x;
     const std::size_t first = k < offsets.size() ? offsets[k] : points.size(),
                       last = k + 1 < offsets.size() ? offsets[k + 1] : points.size();
     if (first > last || last > points.size())
       throw std::runtime_error("has a state whose offsets do not fit its vertices");
-    x.resize(3, static_cast<Eigen::Index>(last - first));
-    for (std::size_t i = first; i < last; ++i)
-      x.col(static_cast<Eigen::Index>(i - first)) << points[i].x, points[i].y, points[i].z;
-    return x;
+    return columnsOf(points, first, last);
   };
   Eigen::Matrix3Xd guide = slice(message.guide_offsets, message.guide_vertices);
   return guide.cols() > 0 ? guide : slice(message.offsets, message.vertices);

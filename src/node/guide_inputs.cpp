@@ -1,11 +1,10 @@
 #include "slender_sim/node/guide_inputs.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <set>
 
 #include "slender_sim/node/converters.h"
+#include "subscribe.h"
 
 namespace slender {
 namespace {
@@ -32,11 +31,11 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   : options_(options),
     simulation_(&simulation),
     clock_(clock),
-    pending_(kMaxPending, options.tf_timeout),
-    paused_(clock, options.guide_timeout, options.guide_ahead),
     shared_tf_buffer_(before ? before->shared_tf_buffer_ : std::make_shared<tf2_ros::Buffer>()),
     tf_buffer_(*shared_tf_buffer_),
-    tf_listener_(before ? std::move(before->tf_listener_) : nullptr)
+    tf_listener_(before ? std::move(before->tf_listener_) : nullptr),
+    intake_(options_, clock, tf_buffer_, drops_, kMaxPending,
+            [this](const Message& message, const Pose& X_WF) { return use(message, X_WF); })
 {
   GuideBuffer::Options buffer_options;
   buffer_options.delay = options.guide_delay;
@@ -52,15 +51,15 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   const bool bodies =
       std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
   if (topics)
-    subscribers_.push_back(
-        nh.subscribe("guides", kQueueSize, &GuideInputs::onGuides, this, ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(subscribe<geometry_msgs::PoseArray>(
+        nh, "guides", kQueueSize, [this](const geometry_msgs::PoseArray& message) { onGuides(message); }));
   if (bodies)
-    subscribers_.push_back(
-        nh.subscribe("bodies", kQueueSize, &GuideInputs::onBodies, this, ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(subscribe<slender_sim::BodyStates>(
+        nh, "bodies", kQueueSize, [this](const slender_sim::BodyStates& message) { onBodies(message); }));
   wind_topic_ = simulation.config().wind_topic;
   if (wind_topic_)
-    subscribers_.push_back(
-        nh.subscribe("wind", kQueueSize, &GuideInputs::onWind, this, ros::TransportHints().tcpNoDelay()));
+    subscribers_.push_back(subscribe<geometry_msgs::Vector3Stamped>(
+        nh, "wind", kQueueSize, [this](const geometry_msgs::Vector3Stamped& message) { onWind(message); }));
   tracking_ = std::make_unique<TrackingInputs>(nh, options_, buffer_options, simulation, clock_, tf_buffer_, drops_);
   tf_ = std::make_unique<TfInputs>(options_, clock_, tf_buffer_, drops_, std::move(own_frames));
   followFrames();
@@ -117,12 +116,8 @@ void GuideInputs::followFrames()
 {
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (!guided_[g].frame.empty())
-      tf_->follow(guided_[g].frame, kindOf(g), [this, g](double time, const Pose& X_WF) {
-        const bool later = guided_[g].buffer->push(time, X_WF);
-        if (later)
-          takenPose(g, time, X_WF);
-        return later;
-      });
+      tf_->follow(guided_[g].frame, kindOf(g),
+                  [this, g](double time, const Pose& X_WF) { return takePose(g, time, X_WF); });
   tracking_->followFrames(*tf_);
 }
 
@@ -148,10 +143,9 @@ void GuideInputs::shareLag()
 void GuideInputs::subscribePose(ros::NodeHandle& nh)
 {
   const int guided = static_cast<int>(guided_.size()) - 1;
-  const boost::function<void(const geometry_msgs::PoseStamped&)> callback =
-      [this, guided](const geometry_msgs::PoseStamped& message) { onPose(guided, message); };
-  subscribers_.push_back(nh.subscribe<const geometry_msgs::PoseStamped&>(
-      guided_.back().topic, kQueueSize, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  subscribers_.push_back(subscribe<geometry_msgs::PoseStamped>(
+      nh, guided_.back().topic, kQueueSize,
+      [this, guided](const geometry_msgs::PoseStamped& message) { onPose(guided, message); }));
 }
 
 /// True when any of them listens to something that has a frame.
@@ -181,23 +175,15 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
     threads_[k].greatest_flow = greatestFlow(threads[k], simulation.config().time.step);
     threads_[k].flow_topic = threads[k].nozzle && threads[k].nozzle->flow.topic;
     threads_[k].belt_topic = threads[k].floor && (threads[k].floor->belt_x.topic || threads[k].floor->belt_y.topic);
+    framed |= threads_[k].belt_topic;
     if (threads_[k].flow_topic)
-    {
-      const boost::function<void(const std_msgs::Float64&)> callback = [this, k](const std_msgs::Float64& message) {
-        onFlow(k, message);
-      };
-      subscribers_.push_back(nh.subscribe<const std_msgs::Float64&>(
-          prefixes[k] + "nozzle/flow", kQueueSize, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
-    }
-    if (threads_[k].belt_topic)
-    {
-      framed = true;
-      const boost::function<void(const geometry_msgs::Vector3Stamped&)> callback =
-          [this, k](const geometry_msgs::Vector3Stamped& message) { onBelt(k, message); };
       subscribers_.push_back(
-          nh.subscribe<const geometry_msgs::Vector3Stamped&>(prefixes[k] + "belt/velocity", kQueueSize, callback,
-                                                             ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
-    }
+          subscribe<std_msgs::Float64>(nh, prefixes[k] + "nozzle/flow", kQueueSize,
+                                       [this, k](const std_msgs::Float64& message) { onFlow(k, message); }));
+    if (threads_[k].belt_topic)
+      subscribers_.push_back(subscribe<geometry_msgs::Vector3Stamped>(
+          nh, prefixes[k] + "belt/velocity", kQueueSize,
+          [this, k](const geometry_msgs::Vector3Stamped& message) { onBelt(k, message); }));
   }
   return framed;
 }
@@ -228,28 +214,12 @@ void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Opt
   obstacles_ = scene.obstacles.size();
 }
 
-bool GuideInputs::checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose,
-                            Pose& X)
-{
-  switch (fromMessage(message, X))
-  {
-    case PoseFault::none: return true;
-    case PoseFault::not_finite:
-      drops_.drop(Drop::not_finite, what, "position and orientation of " + whose + " must be finite");
-      return false;
-    case PoseFault::bad_quaternion:
-      drops_.drop(Drop::bad_quaternion, what, "the orientation of " + whose + ", whose length must be 1 within 1 %");
-      return false;
-  }
-  return false;
-}
-
 void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
 {
   drops_.receive();
-  Entry entry{guided, Pose()};
-  if (checkPose(message.pose, guided_[guided].topic, guided_[guided].name, entry.X_FH))
-    take(guided, guided_[guided].topic, message.header, {entry});
+  const std::string& topic = guided_[guided].topic;
+  if (const std::optional<Pose> X_FH = checkedPose(message.pose, topic, guided_[guided].name, drops_))
+    intake_.take({{guided, topic}, {{guided, *X_FH}}}, message.header);
 }
 
 void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
@@ -265,35 +235,25 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
   std::vector<Entry> entries;
   for (std::size_t g = 0; g < grasps_; ++g)
   {
-    Entry entry{static_cast<int>(g), Pose()};
-    if (!checkPose(message.poses[g], "guides", guided_[g].name, entry.X_FH))
+    const std::optional<Pose> X_FH = checkedPose(message.poses[g], "guides", guided_[g].name, drops_);
+    if (!X_FH)
       return;   // all grasps at one instant, or none
     if (guided_[g].byMessages())
-      entries.push_back(entry);
+      entries.push_back({static_cast<int>(g), *X_FH});
   }
-  take(kGuidesSource, "guides", message.header, entries);
+  intake_.take({{kGuidesSource, "guides"}, entries}, message.header);
 }
 
 void GuideInputs::onBodies(const slender_sim::BodyStates& message)
 {
   drops_.receive();
-  if (message.pose.size() != message.name.size() ||
-      (!message.twist.empty() && message.twist.size() != message.name.size()))
-  {
-    drops_.drop(Drop::wrong_length, "bodies", "name, pose and twist must be equally long (twist may be empty)");
+  if (!isComplete(message, "bodies", drops_))
     return;
-  }
-  const std::set<std::string> names(message.name.begin(), message.name.end());
-  if (names.size() != message.name.size())
-  {
-    drops_.drop(Drop::wrong_length, "bodies", "a name comes twice; there must be one pose per body");
-    return;
-  }
   std::vector<Entry> entries;
   for (std::size_t b = 0; b < message.name.size(); ++b)
   {
-    Entry entry{0, Pose()};
-    if (!checkPose(message.pose[b], "bodies", message.name[b], entry.X_FH))
+    const std::optional<Pose> X_FH = checkedPose(message.pose[b], "bodies", message.name[b], drops_);
+    if (!X_FH)
       return;
     if (!message.twist.empty() && !isFinite(message.twist[b]))
     {
@@ -306,115 +266,46 @@ void GuideInputs::onBodies(const slender_sim::BodyStates& message)
       if (guided_[g].body.empty() || guided_[g].body != message.name[b])   // a name may be empty, too
         continue;
       known = true;
-      entry.guided = static_cast<int>(g);
-      entries.push_back(entry);
+      entries.push_back({static_cast<int>(g), *X_FH});
     }
     if (!known)
       drops_.drop(Drop::unknown_name, "bodies", "nothing follows \"" + message.name[b] + "\"");
   }
   if (!entries.empty())
-    take(kBodiesSource, "bodies", message.header, entries);
+    intake_.take({{kBodiesSource, "bodies"}, entries}, message.header);
 }
 
-void GuideInputs::take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries)
+Use GuideInputs::use(const Message& message, const Pose& X_WF)
 {
-  if (header.frame_id.empty())
-  {
-    drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
-    return;
-  }
-  Message message;
-  message.source = source;
-  message.what = what;
-  message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
-  message.stamp = header.stamp;
-  message.entries = std::move(entries);
-  const Arrival arrival = paused_.arrive(source, message);
-  if (arrival == Arrival::kept)
-    return drops_.keep(what);
-  if (arrival != Arrival::now)
-    return drops_.dropByStamp(arrival == Arrival::stale, what, clock_.secondsAt(message.stamp) - clock_.seconds());
-  takeNow(message);
-}
-
-void GuideInputs::takeNow(const Message& message)
-{
-  const int source = message.source;
-  const std::string& what = message.what;
-  if (!pending_.holds(source, message.frame) && deliver(message, nullptr))
-    return;
-  if (!pending_.add(source, message.frame, message))
-    drops_.drop(Drop::queue_full, what);
-}
-
-void GuideInputs::dropTransform(PoseFault fault, const std::string& what, const std::string& frame)
-{
-  drops_.drop(fault == PoseFault::not_finite ? Drop::not_finite : Drop::bad_quaternion, what,
-              "in the transform from " + frame);
-}
-
-bool GuideInputs::deliver(const Message& message, std::string* why)
-{
-  Pose X_WF;
-  if (message.frame != options_.frame_id)
-  {
-    if (!tf_buffer_.canTransform(options_.frame_id, message.frame, message.stamp, why))
-      return false;
-    try
-    {
-      const PoseFault fault =
-          fromMessage(tf_buffer_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF);
-      if (fault != PoseFault::none)
-      {
-        dropTransform(fault, message.what, message.frame);
-        return true;
-      }
-    }
-    catch (const tf2::TransformException& e)
-    {
-      if (why)
-        *why = e.what();
-      return false;
-    }
-  }
   for (const Entry& entry : message.entries)
     if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-    {
-      drops_.drop(Drop::out_of_range, message.what,
-                  "coordinates must be within " + std::to_string(static_cast<long>(kMaxCoordinate)) + " m");
-      return true;
-    }
+      return Use::out_of_range;
   const double time = clock_.secondsAt(message.stamp);
-  bool late = false;
+  Use use = Use::good;
   for (const Entry& entry : message.entries)
-  {
-    const Pose X_WH = X_WF * entry.X_FH;
-    if (!guided_[entry.guided].buffer->push(time, X_WH))
-    {
-      late = true;
-      continue;
-    }
-    takenPose(static_cast<std::size_t>(entry.guided), time, X_WH);
-  }
-  if (late)
-    drops_.drop(Drop::out_of_order, message.what, "its stamp is not after that of an earlier message");
-  return true;
+    if (!takePose(static_cast<std::size_t>(entry.guided), time, X_WF * entry.X_FH))
+      use = Use::out_of_order;
+  return use;
+}
+
+bool GuideInputs::takePose(std::size_t guided, double time, const Pose& X_WH)
+{
+  const bool later = guided_[guided].buffer->push(time, X_WH);
+  if (later)
+    takenPose(guided, time, X_WH);
+  return later;
 }
 
 void GuideInputs::processPending()
 {
   tracking_->processPending();
   takeHand();
-  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); },
-                   [this](const Message& message, const std::string& why) {
-                     drops_.drop(Drop::no_transform, message.what,
-                                 "from " + message.frame + " to " + options_.frame_id + ": " + why);
-                   });
+  intake_.processPending();
 }
 
 void GuideInputs::onPresent(const std::function<ros::Time()>& present)
 {
-  paused_.onPresent(present);
+  intake_.onPresent(present);
   tracking_->onPresent(present);
 }
 
@@ -422,8 +313,7 @@ void GuideInputs::takeKept(bool all)
 {
   if (all)
     drops_.deliveredKept();
-  for (const auto& [source, message] : paused_.release(all))
-    takeNow(message);
+  intake_.takeKept(all);
   tracking_->takeKept(all);
 }
 
@@ -494,8 +384,7 @@ void GuideInputs::catchUp(const Simulation& simulation)
 
 void GuideInputs::restart(const Simulation& simulation)
 {
-  pending_.clear();
-  paused_.clear();
+  intake_.clear();
   drops_.deliveredKept();
   hand_.clear();
   wind_.reset();

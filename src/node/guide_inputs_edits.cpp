@@ -42,19 +42,16 @@ void GuideInputs::takeOver(GuideInputs& before)
     if (const auto hand = before.hand_.find(g); hand != before.hand_.end())
       hand_[found->second] = hand->second;
   }
-  const auto keep = [&moved](int& source, Message& message) {
+  intake_.takeOver(before.intake_, [&moved](Message& message) {
     std::vector<Entry> entries;
     for (const Entry& entry : message.entries)
       if (const auto found = moved.find(entry.guided); found != moved.end())
         entries.push_back({found->second, entry.X_FH});
-    if (const auto found = moved.find(source); found != moved.end())
-      source = message.source = found->second;
+    if (const auto found = moved.find(message.source); found != moved.end())
+      message.source = found->second;
     message.entries = std::move(entries);
     return !message.entries.empty();
-  };
-  pending_ = std::move(before.pending_);
-  pending_.change(keep);
-  paused_.takeOver(before.paused_, keep);
+  });
   const auto &threads = simulation_->config().threads, &threads_before = before.simulation_->config().threads;
   for (std::size_t k = 0; k < threads.size(); ++k)
     for (std::size_t j = 0; j < threads_before.size(); ++j)

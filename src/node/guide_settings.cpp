@@ -2,17 +2,13 @@
 #include "slender_sim/node/guide_inputs.h"
 
 #include <cmath>
-#include <cstdio>
+
+#include "scene/reader/yaml_number.h"
 
 namespace slender {
 namespace {
 
-std::string text(double value)
-{
-  char out[32];
-  std::snprintf(out, sizeof(out), "%.6g", value);
-  return out;
-}
+std::string text(double value) { return shortNumber(value, 6); }
 
 }   // namespace
 
@@ -29,11 +25,7 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
   else
   {
     threads_[thread].flow = message.data;
-    slender_sim::Input input;
-    input.kind = slender_sim::Input::FLOW;
-    input.index = static_cast<std::int32_t>(thread);
-    input.values = {message.data};
-    taken(std::move(input));
+    takenValues(slender_sim::Input::FLOW, thread, {message.data});
   }
 }
 
@@ -41,38 +33,25 @@ void GuideInputs::onFlow(std::size_t thread, const std_msgs::Float64& message)
 std::optional<Eigen::Vector3d> GuideInputs::velocityOf(const geometry_msgs::Vector3Stamped& message,
                                                        const std::string& what)
 {
-  Eigen::Vector3d velocity(message.vector.x, message.vector.y, message.vector.z);
+  const Eigen::Vector3d velocity = fromMessage(message.vector);
   if (!velocity.allFinite())
   {
     drops_.drop(Drop::not_finite, what, "it must be finite [m/s]");
     return std::nullopt;
   }
-  const std::string& name = message.header.frame_id;
-  if (name.empty())
-  {
-    drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
-    return std::nullopt;
-  }
-  const std::string frame = name.front() == '/' ? name.substr(1) : name;
-  if (frame == options_.frame_id)
-    return velocity;
-  Pose X_WF;
+  const std::optional<std::string> frame = frameOf(message.header, what, drops_);
+  if (!frame || *frame == options_.frame_id)
+    return frame ? std::optional(velocity) : std::nullopt;
   try
   {
-    const PoseFault fault =
-        fromMessage(tf_buffer_.lookupTransform(options_.frame_id, frame, ros::Time(0)).transform, X_WF);
-    if (fault != PoseFault::none)
-    {
-      dropTransform(fault, what, frame);
-      return std::nullopt;
-    }
+    if (const auto X_WF = lookUp(tf_buffer_, options_.frame_id, *frame, ros::Time(0), what, drops_))
+      return X_WF->orientation * velocity;
   }
   catch (const tf2::TransformException& e)
   {
     drops_.drop(Drop::no_transform, what, e.what());
-    return std::nullopt;
   }
-  return X_WF.orientation * velocity;
+  return std::nullopt;
 }
 
 /// Only its horizontal part can be a belt's.
@@ -86,7 +65,7 @@ void GuideInputs::onBelt(std::size_t thread, const geometry_msgs::Vector3Stamped
   if (!(velocity->head<2>().cwiseAbs().maxCoeff() <= kMaxBeltSpeed))
     return drops_.drop(Drop::out_of_range, what, "components must be within " + text(kMaxBeltSpeed) + " m/s");
   threads_[thread].belt = Eigen::Vector3d(velocity->x(), velocity->y(), 0.0);
-  takenVector(slender_sim::Input::BELT, thread, *threads_[thread].belt);
+  takenValues(slender_sim::Input::BELT, thread, {velocity->x(), velocity->y(), 0.0});
 }
 
 void GuideInputs::onWind(const geometry_msgs::Vector3Stamped& message)
@@ -98,7 +77,7 @@ void GuideInputs::onWind(const geometry_msgs::Vector3Stamped& message)
   if (!(velocity->cwiseAbs().maxCoeff() <= kMaxWindSpeed))
     return drops_.drop(Drop::out_of_range, "wind", "components must be within " + text(kMaxWindSpeed) + " m/s");
   wind_ = velocity;
-  takenVector(slender_sim::Input::WIND, 0, *wind_);
+  takenValues(slender_sim::Input::WIND, 0, {wind_->x(), wind_->y(), wind_->z()});
 }
 
 std::vector<GuideInputs::Setting> GuideInputs::settings() const

@@ -1,10 +1,10 @@
 // What is dragged by hand in rviz: its poses go the way that messages of the same thing go.
 #include <algorithm>
-#include <cmath>
 
 #include "marker_tools.h"
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/node/guide_inputs.h"
+#include "subscribe.h"
 
 namespace slender {
 namespace {
@@ -39,10 +39,9 @@ double reachOf(const Shape& shape) { return std::holds_alternative<Plane>(shape)
 
 void GuideInputs::listenToHand(ros::NodeHandle nh, const std::string& topic)
 {
-  const boost::function<void(const visualization_msgs::InteractiveMarkerFeedback&)> callback =
-      [this](const visualization_msgs::InteractiveMarkerFeedback& message) { onHand(message); };
-  subscribers_.push_back(nh.subscribe<const visualization_msgs::InteractiveMarkerFeedback&>(
-      topic + "/feedback", 100, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  using Feedback = visualization_msgs::InteractiveMarkerFeedback;
+  subscribers_.push_back(
+      subscribe<Feedback>(nh, topic + "/feedback", 100, [this](const Feedback& message) { onHand(message); }));
   if (!tf_listener_)
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
 }
@@ -101,9 +100,9 @@ void GuideInputs::onHand(const visualization_msgs::InteractiveMarkerFeedback& me
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (isDraggable(g) && handleName(g) == message.marker_name)
     {
-      Entry entry{static_cast<int>(g), Pose()};
-      if (checkPose(message.pose, "interactive/feedback", message.marker_name, entry.X_FH))
-        hand_[g] = {entry.X_FH, message.header.frame_id};   // the newest of an instant counts
+      const auto X_FH = checkedPose(message.pose, "interactive/feedback", message.marker_name, drops_);
+      if (X_FH)
+        hand_[g] = {*X_FH, message.header.frame_id};   // the newest of an instant counts
       return;
     }
   drops_.drop(Drop::unknown_name, "interactive/feedback", "nothing by hand moves \"" + message.marker_name + "\"");
@@ -127,7 +126,7 @@ void GuideInputs::takeHand()
     const Pose X_FG = last ? moved->second.X_FH : poseOf(*simulation_, g);
     const Entry entry{static_cast<int>(g), X_FG * guided_[g].buffer->graspInGripper().inverse()};
     const bool solid = g >= grasps_ && g < grasps_ + bodies_ + obstacles_;
-    take(solid ? kBodiesSource : static_cast<int>(g), handleName(g), header, {entry});
+    intake_.take({{solid ? kBodiesSource : static_cast<int>(g), handleName(g)}, {entry}}, header);
     moved = last ? hand_.erase(moved) : std::next(moved);
   }
 }

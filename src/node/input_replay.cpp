@@ -32,6 +32,14 @@ std::string topicNamed(rosbag::Bag& bag, const std::string& type, const std::str
 
 }   // namespace
 
+slender_sim::Input makeInput(std::uint8_t kind, std::vector<double> values)
+{
+  slender_sim::Input input;
+  input.kind = kind;
+  input.values = std::move(values);
+  return input;
+}
+
 InputReplay::InputReplay(const std::string& path) : path_(path)
 {
   try

@@ -1,6 +1,5 @@
-#include <cstdio>
-
 #include "marker_tools.h"
+#include "slender_sim/dynamics/failure_place.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_markers.h"
 
@@ -15,9 +14,8 @@ std::string colorLine(MarkerColor what, double range)
                            : what == MarkerColor::curvature ? "curvature"
                                                             : "twist";
   const char* const unit = what == MarkerColor::strain ? "" : what == MarkerColor::curvature ? " 1/m" : " rad/m";
-  char text[120];
-  std::snprintf(text, sizeof text, "%s: blue -%.3g%s, grey 0, red %.3g%s\n", name, range, unit, range, unit);
-  return text;
+  const std::string end = shortNumber(range, 3) + unit;
+  return std::string(name) + ": blue -" + end + ", grey 0, red " + end + "\n";
 }
 
 /// Returns the box of all objects, with the nozzles that rviz shows behind threads.
@@ -69,12 +67,8 @@ void addLegend(const Simulation& simulation, const std_msgs::Header& header, con
   if (options.frames && !simulation.state().rods.empty())
     text += "frames: tangent red, d1 green, d2 blue\n";
   if (options.forces > 0.0)
-  {
-    char line[160];
-    std::snprintf(line, sizeof line, "arrows, %.3g m per N: contact green, holder red, its torque over 0.1 m violet\n",
-                  options.forces);
-    text += line;
-  }
+    text += "arrows, " + shortNumber(options.forces, 3) +
+            " m per N: contact green, holder red, its torque over 0.1 m violet\n";
   const Eigen::AlignedBox3d box = shownBox(simulation);
   Marker marker = makeMarker(header, "legend", 0, Marker::TEXT_VIEW_FACING);
   if (text.empty() || box.isEmpty())

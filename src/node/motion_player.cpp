@@ -8,6 +8,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "param_reader.h"
+#include "scene/reader/yaml_cursor.h"
 #include "slender_sim/node/converters.h"
 
 namespace slender {
@@ -40,14 +41,11 @@ MotionPlayer::MotionPlayer(const ros::NodeHandle& nh, const ros::NodeHandle& nh_
 
   table_ = readPoseFile(file);
   const auto requireBody = [&](const std::string& param, const std::string& name) {
-    std::string names;
+    std::vector<std::string> names;
     for (const BodyTrajectory& body : table_)
-    {
-      if (body.body == name)
-        return;
-      names += (names.empty() ? "" : ", ") + body.body;
-    }
-    throw OptionError("~" + param + ": " + name + " is not in " + file + ", whose bodies are: " + names);
+      names.push_back(body.body);
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw OptionError("~" + param + ": " + name + " is not in " + file + ", whose bodies are: " + joinWords(names));
   };
   if (drives)
   {

@@ -11,18 +11,23 @@
 
 namespace slender {
 
-int nodeMain(int argc, char** argv, const char* name, NodeKind kind)
+int nodeMain(int argc, char** argv, const char* name, const std::function<int()>& run)
 try
 {
   ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   requireNoArguments(argc, argv);
   stopOnSignals();   // a signal also ends a long step, and the bag is completed
-  return SceneNode(ros::NodeHandle(), ros::NodeHandle("~"), kind).spin();
+  return run();
 }
 catch (const std::exception& e)
 {
   std::cerr << name << ": " << e.what() << std::endl;
   return 2;
+}
+
+int nodeMain(int argc, char** argv, const char* name, NodeKind kind)
+{
+  return nodeMain(argc, argv, name, [kind] { return SceneNode(ros::NodeHandle(), ros::NodeHandle("~"), kind).spin(); });
 }
 
 }   // namespace slender

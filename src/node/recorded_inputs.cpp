@@ -10,18 +10,10 @@ using slender_sim::Input;
 
 Input inputOf(std::uint8_t kind, std::size_t index, const std::string& name)
 {
-  Input input;
-  input.kind = kind;
+  Input input = makeInput(kind);
   input.index = static_cast<std::int32_t>(index);
   input.name = name;
   return input;
-}
-
-/// Not normalised: exactly what was handed to the buffer before.
-Pose recordedPose(const geometry_msgs::Pose& from)
-{
-  const geometry_msgs::Quaternion& q = from.orientation;
-  return {fromMessage(from.position), Eigen::Quaterniond(q.w, q.x, q.y, q.z)};
 }
 
 template <class Things>
@@ -64,10 +56,10 @@ void GuideInputs::takenPose(std::size_t guided, double time, const Pose& X_WH) c
   sink_(std::move(input));
 }
 
-void GuideInputs::takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const
+void GuideInputs::takenValues(std::uint8_t kind, std::size_t thread, const std::vector<double>& values) const
 {
   Input input = inputOf(kind, thread, "");
-  input.values = {v.x(), v.y(), v.z()};
+  input.values = values;
   taken(std::move(input));
 }
 
@@ -134,12 +126,7 @@ void TrackingInputs::repeat(const Input& input)
   if (input.kind == Input::GUIDE_BODY)
     good = checked(guide.bodies, input.part, "body that carries a guide").push(input.time, recordedPose(input.pose));
   else if (guide.points)
-  {
-    Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(input.points.size()));
-    for (std::size_t i = 0; i < input.points.size(); ++i)
-      points.col(static_cast<Eigen::Index>(i)) = fromMessage(input.points[i]);
-    good = guide.points->push(input.time, points);
-  }
+    good = guide.points->push(input.time, columnsOf(input.points));
   if (!good)
     throw std::runtime_error("its guide " + input.name + " cannot be taken; the scene is not the recorded one");
 }

@@ -8,11 +8,19 @@
 namespace slender {
 namespace {
 
-void resize(slender_sim::BodyStates& states, std::size_t size)
+void clear(slender_sim::BodyStates& states, const std_msgs::Header& header)
 {
-  states.name.resize(size);
-  states.pose.resize(size);
-  states.twist.resize(size);
+  states.header = header;
+  states.name.clear();
+  states.pose.clear();
+  states.twist.clear();
+}
+
+void append(const std::string& name, const Pose& X, const Twist& velocity, slender_sim::BodyStates& out)
+{
+  out.name.push_back(name);
+  out.pose.push_back(toMessage(X));
+  out.twist.push_back(toMessage(velocity));
 }
 
 }   // namespace
@@ -128,13 +136,6 @@ void SceneMessages::fillCloths(const Simulation& simulation)
 void SceneMessages::fillGrasps(const Simulation& simulation)
 {
   wrenches.resize(simulation.grasps().size());
-  for (std::size_t g = 0; g < wrenches.size(); ++g)
-  {
-    const int grasp = static_cast<int>(g);
-    wrenches[g].header = header;
-    wrenches[g].wrench =
-        simulation.grasps().isActive(grasp) ? toMessage(simulation.grasps().wrench(grasp)) : geometry_msgs::Wrench();
-  }
   grasps.header = header;
   grasps.name.resize(wrenches.size());
   grasps.object.resize(wrenches.size());
@@ -143,6 +144,9 @@ void SceneMessages::fillGrasps(const Simulation& simulation)
   for (std::size_t g = 0; g < wrenches.size(); ++g)
   {
     const int grasp = static_cast<int>(g);
+    wrenches[g].header = header;
+    wrenches[g].wrench =
+        simulation.grasps().isActive(grasp) ? toMessage(simulation.grasps().wrench(grasp)) : geometry_msgs::Wrench();
     grasps.name[g] = simulation.grasps()[g].config->name;
     grasps.object[g] = simulation.grasps().heldObject(grasp);
     grasps.active[g] = simulation.grasps().isActive(grasp);
@@ -154,22 +158,12 @@ void SceneMessages::fillSolids(const Simulation& simulation)
 {
   const SceneState& scene = simulation.state();
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
-  bodies.header = header;
-  resize(bodies, configs.size());
+  clear(bodies, header);
   for (std::size_t b = 0; b < configs.size(); ++b)
-  {
-    bodies.name[b] = configs[b].name;
-    bodies.pose[b] = toMessage(scene.bodies[b].X_WB);
-    bodies.twist[b] = toMessage(scene.bodies[b].velocity);
-  }
-  obstacles.header = header;
-  resize(obstacles, scene.obstacles.size());
+    append(configs[b].name, scene.bodies[b].X_WB, scene.bodies[b].velocity, bodies);
+  clear(obstacles, header);
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
-  {
-    obstacles.name[k] = simulation.config().obstacles[k].name;
-    obstacles.pose[k] = toMessage(scene.obstacles[k]);
-    obstacles.twist[k] = toMessage(scene.obstacle_velocities[k]);
-  }
+    append(simulation.config().obstacles[k].name, scene.obstacles[k], scene.obstacle_velocities[k], obstacles);
 }
 
 void SceneMessages::fillFields(const Simulation& simulation)

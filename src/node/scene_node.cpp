@@ -1,7 +1,6 @@
 #include "slender_sim/node/scene_node.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <iomanip>
 #include <iostream>
 
@@ -15,6 +14,7 @@
 #include "slender_sim/MeshStamped.h"
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
+#include "slender_sim/dynamics/failure_place.h"
 #include "slender_sim/linalg/interruption.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/robot_sources.h"
@@ -242,12 +242,8 @@ bool SceneNode::advance()
   guides_led_on_ = false;
   if (simulation_->state().steps % static_cast<std::uint64_t>(options_.state_every) == 0)
     publishState();
-  else if (options_.publish_clock)
-  {
-    rosgraph_msgs::Clock message;
-    message.clock = clock_.stamp();
-    clock_pub_.publish(message);
-  }
+  else
+    publishClock();
   const double busy = (ros::WallTime::now() - begin).toSec();
   total_.stamp_lag = stampLag();
   recent_.worst_stamp_lag = std::max(recent_.worst_stamp_lag, total_.stamp_lag);
@@ -264,36 +260,32 @@ void SceneNode::fail(const std::string& reason)
 {
   mode_before_failure_ = mode_;
   mode_ = Mode::failed;
-  char time[40];
-  std::snprintf(time, sizeof time, "%.9g", simulation_->state().time);
-  failure_ = "step " + std::to_string(simulation_->state().steps + 1) + " (from t = " + time + " s on): " + reason;
+  failure_ = "step " + std::to_string(simulation_->state().steps + 1) +
+             " (from t = " + shortNumber(simulation_->state().time, 9) + " s on): " + reason;
   ROS_ERROR("%s stopped at %s; call ~reset to start again", nh_priv_.getNamespace().c_str(), failure_.c_str());
   publishDiagnostics();
 }
 
+/// Publishes /clock if the options ask for it.
+void SceneNode::publishClock()
+{
+  if (!options_.publish_clock)
+    return;
+  rosgraph_msgs::Clock message;
+  message.clock = clock_.stamp();
+  clock_pub_.publish(message);
+}
+
 void SceneNode::publishState()
 {
-  if (options_.publish_clock)   // before the messages with this stamp
-  {
-    rosgraph_msgs::Clock message;
-    message.clock = clock_.stamp();
-    clock_pub_.publish(message);
-  }
+  publishClock();   // before the messages with this stamp
   frames_->broadcast(*simulation_, clock_.stamp());
   if (!bag_ && !isHeard())
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
   if (fields_pub_ && (bag_ || fields_pub_.getNumSubscribers() > 0))
     messages_.fillFields(*simulation_);
-  if (bag_)   // first: what is published belongs to others
-    try
-    {
-      bag_->record(messages_);
-    }
-    catch (const std::runtime_error& e)
-    {
-      recordingFailed(e.what());
-    }
+  writeBag([this](BagRecorder& bag) { bag.record(messages_); });   // first: what is published belongs to others
   publishObjects();
   for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
     nozzle_pubs_[k].publish(messages_.nozzles[k]);
@@ -375,11 +367,18 @@ void SceneNode::showHandles()
     hands_->show(inputs_->handles(*simulation_));
 }
 
-void SceneNode::recordingFailed(const std::string& reason)
+/// Calls write(bag) if the node records. A failure ends the recording.
+void SceneNode::writeBag(const std::function<void(BagRecorder&)>& write)
+try
 {
-  bag_failure_ = reason;
+  if (bag_)
+    write(*bag_);
+}
+catch (const std::runtime_error& e)
+{
+  bag_failure_ = e.what();
   bag_.reset();
-  ROS_ERROR("%s: recording stopped: %s", nh_priv_.getNamespace().c_str(), reason.c_str());
+  ROS_ERROR("%s: recording stopped: %s", nh_priv_.getNamespace().c_str(), e.what());
 }
 
 void SceneNode::publishMarkers()
@@ -458,17 +457,7 @@ int SceneNode::spin()
   }
   if (clock_started_)
     publishDiagnostics();
-  if (bag_)
-  {
-    try
-    {
-      bag_->close();
-    }
-    catch (const std::runtime_error& e)
-    {
-      recordingFailed(e.what());
-    }
-  }
+  writeBag([](BagRecorder& bag) { bag.close(); });
   summary();
   if (finished_)
     ros::WallDuration(0.3).sleep();   // the last messages and answers leave

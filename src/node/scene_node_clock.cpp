@@ -118,20 +118,20 @@ double SceneNode::stampLag() const
          static_cast<double>(clock_.ticks() - wall_start_ticks_) * clock_.step() / options_.speed;
 }
 
+void SceneNode::skipToPresent()
+{
+  const std::uint64_t tick = clock_.ticks(), skipped = realign();
+  if (skipped > 0)
+    note(makeInput(slender_sim::Input::SKIP, {static_cast<double>(skipped)}), tick);
+}
+
 /// Physics takes every step; only the clock skips, as after a pause.
 void SceneNode::keepUp()
 {
   const double lag = stampLag();
   if (options_.pace != Pace::wall || options_.max_lag <= 0.0 || lag <= options_.max_lag)
     return;
-  const std::uint64_t tick = clock_.ticks(), skipped = realign();
-  if (skipped > 0)
-  {
-    slender_sim::Input input;
-    input.kind = slender_sim::Input::SKIP;
-    input.values = {static_cast<double>(skipped)};
-    note(std::move(input), tick);
-  }
+  skipToPresent();
   total_.skipped += lag;
   recent_.skipped += lag;
   if (ros::WallTime::now() < next_skip_warning_)

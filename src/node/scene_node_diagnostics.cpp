@@ -4,6 +4,7 @@
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
+#include "scene/reader/yaml_cursor.h"
 #include "slender_sim/node/scene_node.h"
 
 namespace slender {
@@ -100,19 +101,20 @@ void addStart(const Simulation& simulation, DiagnosticStatus& status)
 void addTracking(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
 {
   double error = 0.0, force = 0.0, refused = 0.0;
+  const auto takeForces = [&force](const GuideState& guide) {
+    force = std::max(force, guide.forces.cols() > 0 ? guide.forces.colwise().norm().maxCoeff() : 0.0);
+  };
   for (std::size_t k = 0; k < simulation.state().cloth_guides.size(); ++k)
   {
     const TrackingError now = simulation.trackingError(static_cast<int>(k));
     error = std::max(error, now.met);
     refused = std::max(refused, now.at_bound);
-    const Eigen::Matrix3Xd& forces = simulation.state().cloth_guides[k].forces;
-    force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+    takeForces(simulation.state().cloth_guides[k]);
   }
   for (std::size_t r = 0; r < simulation.state().rod_guides.size(); ++r)
   {
     error = std::max(error, simulation.rodTrackingError(static_cast<int>(r)));
-    const Eigen::Matrix3Xd& forces = simulation.state().rod_guides[r].forces;
-    force = std::max(force, forces.cols() > 0 ? forces.colwise().norm().maxCoeff() : 0.0);
+    takeForces(simulation.state().rod_guides[r]);
   }
   add(status, "constraint residual [m]", error);
   add(status, "worst constraint residual over size", recent.tracking_error);
@@ -193,9 +195,7 @@ void SceneNode::remindOfInputs()
 {
   if (mode_ != Mode::running || replay_ || ros::WallTime::now() < next_input_reminder_)
     return;
-  std::string waits;
-  for (const std::string& body : inputs_->unheardBodies())
-    waits += (waits.empty() ? "" : ", ") + body;
+  const std::string waits = joinWords(inputs_->unheardBodies());
   if (!waits.empty())
   {
     const std::string& stranger = inputs_->drops().last(Drop::unknown_name);
@@ -207,9 +207,7 @@ void SceneNode::remindOfInputs()
   if (!told_of_topics_ && total_.steps > 0 && total_.simulated > kClockReminder / 2)
   {
     told_of_topics_ = true;
-    std::string topics;
-    for (const std::string& topic : inputs_->unheardTopics())
-      topics += (topics.empty() ? "" : ", ") + topic;
+    const std::string topics = joinWords(inputs_->unheardTopics());
     if (!topics.empty())
       ROS_INFO("%s: nobody has published a pose yet for %s; what follows it stays where it is",
                nh_priv_.getNamespace().c_str(), topics.c_str());
@@ -234,6 +232,30 @@ std::string SceneNode::clockWentBack() const
   return behind > kBehind ? "waits for /clock, which is " + std::to_string(behind) +
                                 " s behind the simulated time; start the node anew if it went back"
                           : "";
+}
+
+void SceneNode::addLimits(DiagnosticStatus& status) const
+{
+  const auto report = [&status](std::uint8_t level, const std::string& message) {
+    status.message += (status.message.empty() ? "" : "; ") + message;
+    if (level > status.level)
+      status.level = level;
+  };
+  const std::vector<std::string> lasting = limits_->lasting();
+  if (!limits_->held().empty())
+    report(DiagnosticStatus::ERROR, "inputs are held (call ~pause with false to let them go on): " + limits_->held());
+  else if (!lasting.empty())
+    report(DiagnosticStatus::WARN,
+           lasting.front() + (lasting.size() > 1 ? " and " + std::to_string(lasting.size() - 1) + " more limits" : ""));
+  const std::vector<std::string>& inside = crossings_->heldInside();
+  if (!inside.empty())
+    report(DiagnosticStatus::WARN, inside.front());
+  for (const std::string& pair : inside)
+    add(status, "held inside", pair);
+  add(status, "limits exceeded now", std::uint64_t{lasting.size()});
+  add(status, "limits exceeded so far", std::to_string(limits_->count()));
+  if (!lasting.empty())
+    add(status, "last limit exceeded", lasting.back());
 }
 
 DiagnosticStatus SceneNode::simulationStatus() const

@@ -8,7 +8,6 @@
 
 #include "slender_sim/node/scene_markers.h"
 #include "slender_sim/node/scene_node.h"
-#include "slender_sim/scene/reader.h"
 
 namespace slender {
 namespace {
@@ -76,10 +75,8 @@ bool SceneNode::onEdit(Kind kind, slender_sim::EditScene::Request& request, slen
   {
     EditedScene scene = edited({kind, request.text});
     response.message = scene.warnings;
-    Input input;
-    for (const auto& [one, number] : kinds)
-      if (one == kind)
-        input.kind = number;
+    const auto found = std::find_if(kinds.begin(), kinds.end(), [kind](const auto& k) { return k.first == kind; });
+    Input input = makeInput(found->second);
     input.text = request.text;
     note(std::move(input), clock_.ticks());
     takeUp(std::move(scene));
@@ -134,16 +131,10 @@ void SceneNode::takeUp(EditedScene edited)
   std_msgs::String scene;
   scene.data = simulation_->config().source;
   scene_pub_.publish(scene);
-  if (bag_)
-    try
-    {
-      bag_->sceneChanged(*simulation_);
-      bag_->recordScene(scene.data, clock_.stamp());
-    }
-    catch (const std::runtime_error& e)
-    {
-      recordingFailed(e.what());
-    }
+  writeBag([&](BagRecorder& bag) {
+    bag.sceneChanged(*simulation_);
+    bag.recordScene(scene.data, clock_.stamp());
+  });
   if (topics_->has_cloths)
     publishMesh();
   options_.markers.letters = 0.0;   // The next picture chooses them for the edited scene.

@@ -1,20 +1,10 @@
 // If a limit of the scene is exceeded, the node warns and reacts as `on_limit` says.
 #include "slender_sim/node/scene_node.h"
 
-#include <algorithm>
-
 namespace slender {
 namespace {
 
 constexpr double kLimitReminder = 1.0;   // [s] wall time between warnings
-
-diagnostic_msgs::KeyValue entry(const std::string& key, const std::string& value)
-{
-  diagnostic_msgs::KeyValue pair;
-  pair.key = key;
-  pair.value = value;
-  return pair;
-}
 
 }   // namespace
 
@@ -56,31 +46,6 @@ void SceneNode::letInputsGoOn()
 {
   limits_->goOn();
   inputs_->catchUp(*simulation_);
-}
-
-void SceneNode::addLimits(diagnostic_msgs::DiagnosticStatus& status) const
-{
-  const auto raise = [&status](std::uint8_t level, const std::string& message) {
-    status.message += (status.message.empty() ? "" : "; ") + message;
-    if (level > status.level)
-      status.level = level;
-  };
-  const std::vector<std::string> lasting = limits_->lasting();
-  if (!limits_->held().empty())
-    raise(diagnostic_msgs::DiagnosticStatus::ERROR,
-          "inputs are held (call ~pause with false to let them go on): " + limits_->held());
-  else if (!lasting.empty())
-    raise(diagnostic_msgs::DiagnosticStatus::WARN,
-          lasting.front() + (lasting.size() > 1 ? " and " + std::to_string(lasting.size() - 1) + " more limits" : ""));
-  const std::vector<std::string>& inside = crossings_->heldInside();
-  if (!inside.empty())
-    raise(diagnostic_msgs::DiagnosticStatus::WARN, inside.front());
-  for (const std::string& pair : inside)
-    status.values.push_back(entry("held inside", pair));
-  status.values.push_back(entry("limits exceeded now", std::to_string(lasting.size())));
-  status.values.push_back(entry("limits exceeded so far", std::to_string(limits_->count())));
-  if (!lasting.empty())
-    status.values.push_back(entry("last limit exceeded", lasting.back()));
 }
 
 }   // namespace slender

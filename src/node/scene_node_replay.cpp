@@ -1,14 +1,11 @@
 // What changes a run from outside: recorded beside its states, and repeated from such a record.
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <unistd.h>
 
 #include "slender_sim/node/bag_paths.h"
-#include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_node.h"
 #include "slender_sim/node/scene_option.h"
 #include "slender_sim/scene/reader.h"
@@ -103,26 +100,15 @@ void SceneNode::note(Input input, std::uint64_t tick)
   if (!bag_ || !options_.record_inputs || replay_)
     return;
   if (inputs_noted_ == 0 && input.kind != Input::SETTINGS)
-  {
-    Input settings;
-    settings.kind = Input::SETTINGS;
-    settings.values = {options_.guide_delay, options_.guide_delay_auto ? 1.0 : 0.0, options_.live_guides ? 1.0 : 0.0,
-                       options_.catch_up_time, options_.catch_up_speed};
-    note(std::move(settings), tick);
-  }
+    note(
+        makeInput(Input::SETTINGS, {options_.guide_delay, options_.guide_delay_auto ? 1.0 : 0.0,
+                                    options_.live_guides ? 1.0 : 0.0, options_.catch_up_time, options_.catch_up_speed}),
+        tick);
   input.header.stamp = clock_.stamp();
   input.header.frame_id = options_.frame_id;
   input.number = inputs_noted_++;
   input.tick = tick;
-  try
-  {
-    if (bag_)
-      bag_->recordInput(input);
-  }
-  catch (const std::runtime_error& e)
-  {
-    recordingFailed(e.what());
-  }
+  writeBag([&input](BagRecorder& bag) { bag.recordInput(input); });
 }
 
 void SceneNode::noteJump(Input input, std::uint64_t tick, std::uint64_t skipped, bool failed)
@@ -133,18 +119,12 @@ void SceneNode::noteJump(Input input, std::uint64_t tick, std::uint64_t skipped,
 
 void SceneNode::noteGrasp(const SetGrasp::Request& request, const std::string& why)
 {
-  Input input;
+  Input input =
+      makeInput(Input::SET_GRASP, {static_cast<double>(request.action), static_cast<double>(request.first_node),
+                                   static_cast<double>(request.last_node), request.point.x, request.point.y,
+                                   request.point.z, request.max_distance, request.position_only ? 1.0 : 0.0});
   input.text = why;
-  input.kind = Input::SET_GRASP;
   input.name = request.name;
-  input.values = {static_cast<double>(request.action),
-                  static_cast<double>(request.first_node),
-                  static_cast<double>(request.last_node),
-                  request.point.x,
-                  request.point.y,
-                  request.point.z,
-                  request.max_distance,
-                  request.position_only ? 1.0 : 0.0};
   note(std::move(input), clock_.ticks());
 }
 

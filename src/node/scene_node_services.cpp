@@ -45,20 +45,13 @@ bool SceneNode::onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::
   }
   if (!request.data && mode_ == Mode::paused)
   {
-    const std::uint64_t tick = clock_.ticks(), skipped = realign();
-    slender_sim::Input input;
-    input.kind = slender_sim::Input::SKIP;
-    input.values = {static_cast<double>(skipped)};
-    if (skipped > 0)
-      note(std::move(input), tick);
+    skipToPresent();
     inputs_->takeKept(true);
   }
   if (!request.data && !limits_->held().empty())
   {
     letInputsGoOn();
-    slender_sim::Input input;
-    input.kind = slender_sim::Input::GO_ON;
-    note(std::move(input), clock_.ticks());
+    note(makeInput(slender_sim::Input::GO_ON), clock_.ticks());
   }
   mode_ = request.data ? Mode::paused : Mode::running;
   step_ended_ = "~pause was called";
@@ -89,10 +82,8 @@ bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
     mode_ = mode_before_failure_;
   failure_.clear();
   last_report_ = StepReport();
-  slender_sim::Input input;
-  input.kind = slender_sim::Input::RESET;
   const std::uint64_t tick = clock_.ticks(), skipped = jumped();
-  noteJump(std::move(input), tick, skipped, failed && guides_led_on_);
+  noteJump(makeInput(slender_sim::Input::RESET), tick, skipped, failed && guides_led_on_);
   publishState();
   inputs_since_ = clock_.seconds();
   publishDiagnostics();
@@ -198,11 +189,9 @@ bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request,
     setFunctions(request, response);
   if (!response.success)
     return true;
-  slender_sim::Input input;
-  input.kind = slender_sim::Input::SET_FUNCTIONS;
+  slender_sim::Input input = makeInput(slender_sim::Input::SET_FUNCTIONS, {request.blend});
   input.name = request.name;
   input.text = request.set;
-  input.values = {request.blend};
   note(std::move(input), clock_.ticks());
   return true;
 }
@@ -327,8 +316,7 @@ bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::Fil
   if (!response.message.empty())
     return true;
   queue_.callAvailable();   // older than the state that takes over
-  slender_sim::Input input;
-  input.kind = slender_sim::Input::LOAD;
+  slender_sim::Input input = makeInput(slender_sim::Input::LOAD);
   const std::string path = wholePath(request.path);
   try
   {

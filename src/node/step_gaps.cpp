@@ -1,8 +1,8 @@
 #include "slender_sim/node/step_gaps.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
+
+#include "scene/reader/yaml_number.h"
 
 namespace slender {
 namespace {
@@ -10,12 +10,7 @@ namespace {
 // times the median: jitter of a sensor stays below, one lost message of a steady stream is 2, two are 3
 constexpr double kLongInterval = 2.5;
 
-std::string number(double value)
-{
-  char out[40];
-  std::snprintf(out, sizeof out, "%.6g", value);
-  return out;
-}
+std::string number(double value) { return shortNumber(value, 6); }
 
 }   // namespace
 

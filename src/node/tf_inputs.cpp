@@ -1,11 +1,13 @@
 #include "slender_sim/node/tf_inputs.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include <ros/console.h>
 
+#include "scene/reader/yaml_cursor.h"
+#include "scene/reader/yaml_number.h"
 #include "slender_sim/node/converters.h"
+#include "slender_sim/node/message_intake.h"
 
 namespace slender {
 namespace {
@@ -14,13 +16,6 @@ namespace {
 // fit into the delay.
 constexpr double kSpacing = 0.4;
 constexpr int kMostParents = 100;
-
-std::string seconds(double value)
-{
-  char out[32];
-  std::snprintf(out, sizeof out, "%.3g s", value);
-  return out;
-}
 
 }   // namespace
 
@@ -69,7 +64,7 @@ std::optional<ros::Time> TfInputs::newest(Frame& frame) const
   frame.stale = age > options_.guide_timeout;
   if (frame.stale)
   {
-    frame.why = "its newest transform is " + seconds(age) + " old (~guide_timeout)";
+    frame.why = "its newest transform is " + shortNumber(age, 3) + " s old (~guide_timeout)";
     return std::nullopt;
   }
   const double spacing = beyond ? kSpacing * options_.guide_delay - 0.5 * clock_.step() : 0.0;
@@ -105,11 +100,7 @@ void TfInputs::lookAt(Frame& frame)
   }
   const double time = clock_.secondsAt(*stamp);
   if (!(X_WF.position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-  {
-    drops_.drop(Drop::out_of_range, "tf " + frame.name,
-                "coordinates must be within " + std::to_string(static_cast<long>(kMaxCoordinate)) + " m");
-    return;
-  }
+    return dropOutOfRange("tf " + frame.name, drops_);
   if (!frame.checked)
   {
     ROS_INFO("%s: the frame %s of tf has come", frame.followers.front().who.c_str(), frame.name.c_str());
@@ -149,10 +140,10 @@ std::vector<TfInputs::State> TfInputs::states() const
   std::vector<State> states;
   for (const Frame& frame : frames_)
   {
-    std::string who;
+    std::vector<std::string> who;
     for (const Follower& follower : frame.followers)
-      who += (who.empty() ? "" : ", ") + follower.who;
-    states.push_back({frame.name, who, frame.last.has_value(), frame.stale, frame.why});
+      who.push_back(follower.who);
+    states.push_back({frame.name, joinWords(who), frame.last.has_value(), frame.stale, frame.why});
   }
   return states;
 }

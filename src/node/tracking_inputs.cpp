@@ -1,11 +1,10 @@
 #include "slender_sim/node/tracking_inputs.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
-#include <set>
 
 #include "slender_sim/node/converters.h"
+#include "subscribe.h"
 
 namespace slender {
 namespace {
@@ -31,10 +30,9 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
   : options_(options),
     buffers_(buffers),
     clock_(clock),
-    tf_(tf),
     drops_(drops),
-    pending_(kMaxPending, options.tf_timeout),
-    paused_(clock, options.guide_timeout, options.guide_ahead)
+    intake_(options, clock, tf, drops, kMaxPending,
+            [this](const Message& message, const Pose& X_WF) { return use(message, X_WF); })
 {
   const std::vector<ClothConfig>& cloths = simulation.config().cloths;
   const std::vector<RodConfig>& rods = simulation.config().rods;
@@ -58,23 +56,14 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
   for (std::size_t g = 0; g < guides_.size(); ++g)
   {
     const int index = static_cast<int>(g);
-    const auto hints = ros::TransportHints().tcpNoDelay();
     if (guides_[g].carried && guides_[g].carried->by_tf)
       continue;   // see followFrames()
     if (guides_[g].carried)
-    {
-      const boost::function<void(const slender_sim::BodyStates&)> callback =
-          [this, index](const slender_sim::BodyStates& m) { onBodies(index, m); };
-      subscribers_.push_back(nh.subscribe<const slender_sim::BodyStates&>(guides_[g].topic, kQueueSize, callback,
-                                                                          ros::VoidConstPtr(), hints));
-    }
+      subscribers_.push_back(subscribe<slender_sim::BodyStates>(
+          nh, guides_[g].topic, kQueueSize, [this, index](const slender_sim::BodyStates& m) { onBodies(index, m); }));
     else
-    {
-      const boost::function<void(const sensor_msgs::PointCloud2&)> callback =
-          [this, index](const sensor_msgs::PointCloud2& m) { onPoints(index, m); };
-      subscribers_.push_back(nh.subscribe<const sensor_msgs::PointCloud2&>(guides_[g].topic, kQueueSize, callback,
-                                                                           ros::VoidConstPtr(), hints));
-    }
+      subscribers_.push_back(subscribe<sensor_msgs::PointCloud2>(
+          nh, guides_[g].topic, kQueueSize, [this, index](const sensor_msgs::PointCloud2& m) { onPoints(index, m); }));
   }
 }
 
@@ -94,16 +83,14 @@ void TrackingInputs::takeOver(TrackingInputs& before)
       old.carried = now.carried;
       now = std::move(old);
     }
-  pending_ = std::move(before.pending_);
-  const auto keep = [&moved](int& source, Message& message) {
-    const auto found = moved.find(message.guide);
+  intake_.takeOver(before.intake_, [&](Message& message) {
+    const auto found = moved.find(message.source);
     if (found == moved.end())
       return false;
-    source = message.guide = found->second;
+    message.source = found->second;
+    message.what = guides_[found->second].topic;
     return true;
-  };
-  pending_.change(keep);
-  paused_.takeOver(before.paused_, keep);
+  });
 }
 
 /// `guide`: with its topic's prefix.
@@ -130,12 +117,8 @@ void TrackingInputs::followFrames(TfInputs& tf)
     if (!guides_[g].carried || !guides_[g].carried->by_tf)
       continue;
     const int guide = static_cast<int>(g);
-    tf.follow(guides_[g].carried->bodies.front(), guides_[g].topic, [this, guide](double time, const Pose& X_WF) {
-      const bool later = guides_[guide].bodies.front().push(time, X_WF);
-      if (later)
-        takenBody(guide, 0, time, X_WF);
-      return later;
-    });
+    tf.follow(guides_[g].carried->bodies.front(), guides_[g].topic,
+              [this, guide](double time, const Pose& X_WF) { return takeBody(guide, 0, time, X_WF); });
   }
 }
 
@@ -171,8 +154,7 @@ void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message
 {
   drops_.receive();
   const std::string& what = guides_[guide].topic;
-  Message taken;
-  taken.guide = guide;
+  Message taken{{guide, what}};
   const std::string why = fromPoints(message, taken.points);
   if (!why.empty())
     return drops_.drop(Drop::wrong_length, what, why);
@@ -183,89 +165,35 @@ void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message
             " has " + std::to_string(guides_[guide].held.cols()) + (guides_[guide].of_rod ? " nodes" : " vertices"));
   if (!taken.points.allFinite())
     return drops_.drop(Drop::not_finite, what, "all points must be finite");
-  take(std::move(taken), message.header);
+  intake_.take(std::move(taken), message.header);
 }
 
 void TrackingInputs::onBodies(int guide, const slender_sim::BodyStates& message)
 {
   drops_.receive();
   const std::string& what = guides_[guide].topic;
-  if (message.pose.size() != message.name.size() ||
-      (!message.twist.empty() && message.twist.size() != message.name.size()))
-    return drops_.drop(Drop::wrong_length, what, "name, pose and twist must be equally long (twist may be empty)");
-  if (std::set<std::string>(message.name.begin(), message.name.end()).size() != message.name.size())
-    return drops_.drop(Drop::wrong_length, what, "a name comes twice; there must be one pose per body");
-  Message taken;
-  taken.guide = guide;
+  if (!isComplete(message, what, drops_))
+    return;
+  Message taken{{guide, what}};
   const std::vector<std::string>& names = guides_[guide].carried->bodies;
   for (std::size_t b = 0; b < message.name.size(); ++b)
   {
-    Pose pose;
-    const PoseFault fault = fromMessage(message.pose[b], pose);
-    if (fault == PoseFault::not_finite)
-      return drops_.drop(Drop::not_finite, what, "position and orientation of " + message.name[b] + " must be finite");
-    if (fault == PoseFault::bad_quaternion)
-      return drops_.drop(Drop::bad_quaternion, what,
-                         "the orientation of " + message.name[b] + ", whose length must be 1 within 1 %");
+    const std::optional<Pose> pose = checkedPose(message.pose[b], what, message.name[b], drops_);
+    if (!pose)
+      return;
     const auto found = std::find(names.begin(), names.end(), message.name[b]);
     if (found == names.end())
       drops_.drop(Drop::unknown_name, what, "\"" + message.name[b] + "\" carries no vertices of the guide");
     else
-      taken.bodies.emplace_back(static_cast<int>(found - names.begin()), pose);
+      taken.bodies.emplace_back(static_cast<int>(found - names.begin()), *pose);
   }
   if (!taken.bodies.empty())
-    take(std::move(taken), message.header);
+    intake_.take(std::move(taken), message.header);
 }
 
-void TrackingInputs::take(Message message, const std_msgs::Header& header)
+Use TrackingInputs::use(const Message& message, const Pose& X_WF)
 {
-  const std::string& what = guides_[message.guide].topic;
-  if (header.frame_id.empty())
-    return drops_.drop(Drop::bad_frame, what, "header.frame_id is empty");
-  message.frame = header.frame_id.front() == '/' ? header.frame_id.substr(1) : header.frame_id;   // tf2 wants no slash
-  message.stamp = header.stamp;
-  const Arrival arrival = paused_.arrive(message.guide, message);
-  if (arrival == Arrival::kept)
-    return drops_.keep(what);
-  if (arrival != Arrival::now)
-    return drops_.dropByStamp(arrival == Arrival::stale, what, clock_.secondsAt(message.stamp) - clock_.seconds());
-  takeNow(message);
-}
-
-void TrackingInputs::takeNow(const Message& message)
-{
-  const std::string& what = guides_[message.guide].topic;
-  if (!pending_.holds(message.guide, message.frame) && deliver(message, nullptr))
-    return;
-  if (!pending_.add(message.guide, message.frame, message))
-    drops_.drop(Drop::queue_full, what);
-}
-
-/// False when the transform is not known yet.
-bool TrackingInputs::deliver(const Message& message, std::string* why)
-{
-  Guide& guide = guides_[message.guide];
-  Pose X_WF;
-  if (message.frame != options_.frame_id)
-  {
-    try
-    {
-      if (!tf_.canTransform(options_.frame_id, message.frame, message.stamp, why))
-        return false;
-      if (fromMessage(tf_.lookupTransform(options_.frame_id, message.frame, message.stamp).transform, X_WF) !=
-          PoseFault::none)
-      {
-        drops_.drop(Drop::bad_quaternion, guide.topic, "in the transform from " + message.frame);
-        return true;
-      }
-    }
-    catch (const tf2::TransformException& e)
-    {
-      if (why)
-        *why = e.what();
-      return false;
-    }
-  }
+  Guide& guide = guides_[message.source];
   const double time = clock_.secondsAt(message.stamp);
   Eigen::Matrix3Xd points = message.points;
   if (message.frame != options_.frame_id)   // an identity would round
@@ -275,44 +203,25 @@ bool TrackingInputs::deliver(const Message& message, std::string* why)
   for (const auto& [body, pose] : message.bodies)
     good = good && (X_WF * pose.position).cwiseAbs().maxCoeff() <= kMaxCoordinate;
   if (!good)
-  {
-    drops_.drop(Drop::out_of_range, guide.topic,
-                "coordinates must be within " + std::to_string(static_cast<long>(kMaxCoordinate)) + " m");
-    return true;
-  }
+    return Use::out_of_range;
   bool late = false;
   if (guide.points)
   {
     late = !guide.points->push(time, points);
     if (!late)
-      takenPoints(message.guide, time, points);
+      takenPoints(message.source, time, points);
   }
   for (const auto& [body, pose] : message.bodies)
-  {
-    const Pose X_WH = X_WF * pose;
-    const bool good = guide.bodies[body].push(time, X_WH);
-    late |= !good;
-    if (good)
-      takenBody(message.guide, body, time, X_WH);
-  }
-  if (late)
-    drops_.drop(Drop::out_of_order, guide.topic, "its stamp is not after that of an earlier message");
-  return true;
+    late |= !takeBody(message.source, body, time, X_WF * pose);
+  return late ? Use::out_of_order : Use::good;
 }
 
-void TrackingInputs::processPending()
+bool TrackingInputs::takeBody(int guide, int body, double time, const Pose& X_WH)
 {
-  pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); },
-                   [this](const Message& message, const std::string& why) {
-                     drops_.drop(Drop::no_transform, guides_[message.guide].topic,
-                                 "from " + message.frame + " to " + options_.frame_id + ": " + why);
-                   });
-}
-
-void TrackingInputs::takeKept(bool all)
-{
-  for (const auto& [guide, message] : paused_.release(all))
-    takeNow(message);
+  const bool later = guides_[guide].bodies[body].push(time, X_WH);
+  if (later)
+    takenBody(guide, body, time, X_WH);
+  return later;
 }
 
 void TrackingInputs::apply(double time, SceneInputs& inputs)
@@ -365,8 +274,7 @@ void TrackingInputs::attachAll(const Simulation& simulation)
 
 void TrackingInputs::restart(const Simulation& simulation)
 {
-  pending_.clear();
-  paused_.clear();
+  intake_.clear();
   for (Guide& guide : guides_)
   {
     const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index, guide.of_rod);

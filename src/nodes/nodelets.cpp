@@ -72,26 +72,16 @@ private:
   std::thread thread_;
 };
 
-struct AnySceneNodelet : SceneNodelet
+template <NodeKind kind>
+struct NodeletOf : SceneNodelet
 {
-  AnySceneNodelet() : SceneNodelet(NodeKind::scene) {}
+  NodeletOf() : SceneNodelet(kind) {}
 };
-struct RodNodelet : SceneNodelet
-{
-  RodNodelet() : SceneNodelet(NodeKind::rods) {}
-};
-struct ThreadNodelet : SceneNodelet
-{
-  ThreadNodelet() : SceneNodelet(NodeKind::threads) {}
-};
-struct ClothNodelet : SceneNodelet
-{
-  ClothNodelet() : SceneNodelet(NodeKind::cloths) {}
-};
-struct TrackingNodelet : SceneNodelet
-{
-  TrackingNodelet() : SceneNodelet(NodeKind::tracking) {}
-};
+using AnySceneNodelet = NodeletOf<NodeKind::scene>;
+using RodNodelet = NodeletOf<NodeKind::rods>;
+using ThreadNodelet = NodeletOf<NodeKind::threads>;
+using ClothNodelet = NodeletOf<NodeKind::cloths>;
+using TrackingNodelet = NodeletOf<NodeKind::tracking>;
 
 }   // namespace slender
 

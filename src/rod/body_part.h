@@ -7,7 +7,6 @@
 #include "body_surface.h"
 #include "body_system.h"
 #include "rod_stepper_impl.h"
-#include "slender_sim/contact/contact_properties.h"
 #include "slender_sim/dynamics/fast_projection.h"
 
 namespace slender {

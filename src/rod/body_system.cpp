@@ -10,11 +10,9 @@
 
 namespace slender {
 
-void checkBody(const RigidBodyModel& b)
+void checkBody(const BodyProperties& b)
 {
   const auto refuse = [&](const std::string& why) { throw std::invalid_argument("body " + b.name + ": " + why); };
-  if (!b.simulated)
-    return;
   if (!(b.mass > 0) || !std::isfinite(b.mass))
     refuse("mass = " + std::to_string(b.mass) + " kg; must be greater than 0");
   if (!b.inertia.allFinite() || (b.inertia - b.inertia.transpose()).norm() > 1e-9 * b.inertia.norm())

@@ -8,16 +8,6 @@ namespace slender {
 
 namespace {
 
-/// Voronoi length of a node; of an end of an open rod half its edge.
-double voronoi(const RodModel& model, int node)
-{
-  const int edges = model.edges();
-  const double before = model.closed ? model.rest_length[(node + edges - 1) % edges]
-                        : node > 0   ? model.rest_length[node - 1]
-                                     : 0.0;
-  return 0.5 * (before + (node < edges ? model.rest_length[node] : 0.0));
-}
-
 void requireFinite(const RodModel& model, Eigen::Index entries, bool finite, const char* what)
 {
   if (entries != model.nodes())
@@ -39,7 +29,7 @@ Eigen::VectorXd evenTwist(const RodModel& model, double total)
 {
   Eigen::VectorXd twist(model.nodes());
   for (int i = 0; i < model.nodes(); ++i)
-    twist[i] = voronoi(model, i);
+    twist[i] = model.voronoiLength(i);
   return twist * (total / twist.sum());
 }
 
@@ -72,7 +62,7 @@ void setNaturalCurvature(RodModel& model, const Eigen::Matrix2Xd& curvature)
   requireFinite(model, curvature.cols(), curvature.allFinite(), "natural curvature");
   for (int i = 0; i < model.nodes(); ++i)
   {
-    const double turn = curvature.col(i).norm() * voronoi(model, i);
+    const double turn = curvature.col(i).norm() * model.voronoiLength(i);
     if (turn >= 2.0)
       throw std::invalid_argument("rod '" + model.name + "': its natural curvature turns the joint at node " +
                                   std::to_string(i) + " by " + std::to_string(turn) +

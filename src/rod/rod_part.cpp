@@ -102,11 +102,7 @@ void RodPart::setCarriedInertia(const Stage& stage)
 {
   const double inertia = 1.0 / (stage.tau_a * stage.tau_a), damping = 1.0 / stage.tau_v;
   const RodModel& m = *rod_.model;
-  for (const Weld& weld : welds_)
-  {
-    const GraspState& g = rod_.work.grasps[weld.grasp];
-    if (!g.active)
-      continue;
+  forActiveWelds([&](const Weld& weld, const GraspState& g) {
     const BodySystem& body = weld.body->system;
     for (int i = g.first_node; i <= g.last_node; ++i)
     {
@@ -115,7 +111,7 @@ void RodPart::setCarriedInertia(const Stage& stage)
       system_.setInertia(i, wm + wd, (wm * body.inertiaTarget(r) + wd * body.dampingTarget(r)) / (wm + wd),
                          rod_.load(*inputs_, i));
     }
-  }
+  });
 }
 
 void RodPart::takeCarriedMotion()
@@ -139,11 +135,7 @@ void RodPart::passGradient()
     return;
   const RodArrays& a = system_.arrays();
   const double* gradient = system_.gradient();
-  for (const Weld& weld : welds_)
-  {
-    const GraspState& g = rod_.work.grasps[weld.grasp];
-    if (!g.active)
-      continue;
+  forActiveWelds([&](const Weld& weld, const GraspState& g) {
     for (int i = g.first_node; i <= g.last_node; ++i)
       weld.body->addForceAt(system_.position(i), -Eigen::Map<const Eigen::Vector3d>(gradient + 4 * i));
     for (int j = g.first_node; j < g.last_node; ++j)
@@ -151,7 +143,7 @@ void RodPart::passGradient()
     for (const ClampJoint& c : system().clamps())
       if (c.grasp == weld.grasp)
         weld.body->system.gradient.tail<3>() -= c.torque;
-  }
+  });
 }
 
 /// Weighted unknowns that an unknown of the rod stands for: itself, or those of the body that carries it.
@@ -240,11 +232,7 @@ void RodPart::addCarried(SharedMatrix& matrix) const
     columnsOf(unknown, 1.0, b);
     matrix.addPair(a, b, value);
   }
-  for (const Weld& weld : welds_)
-  {
-    const GraspState& g = rod_.work.grasps[weld.grasp];
-    if (!g.active)
-      continue;
+  forActiveWelds([&](const Weld& weld, const GraspState& g) {
     const int base = weld.body->offset + 3;
     for (int i = g.first_node; i <= g.last_node; ++i)
     {
@@ -254,7 +242,7 @@ void RodPart::addCarried(SharedMatrix& matrix) const
         for (int q = 0; q <= p; ++q)
           matrix.add(base + p, base + q, 0.5 * (grad[p] * r[q] + r[p] * grad[q]) - (p == q ? grad.dot(r) : 0.0));
     }
-  }
+  });
 }
 
 /// The turn of a clamped section that a body carries. Turning the section is turning the edge backwards, so its

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <vector>
 
 #include "island/chain_part.h"
@@ -53,6 +52,15 @@ public:
   void addSurface(ContactSurface& surface) const override;
 
 private:
+  /// f(weld, grasp) for each grasp that is active and that a simulated body carries.
+  template <class F>
+  void forActiveWelds(F&& f) const
+  {
+    for (const Weld& weld : welds_)
+      if (const GraspState& g = rod_.work.grasps[weld.grasp]; g.active)
+        f(weld, g);
+  }
+
   /// Whether friction turns the rod about its tangents. It does not with methods whose stage lies inside the step,
   /// because these relax the frames at the end of the step, which removes spins.
   bool turns() const

@@ -27,11 +27,7 @@ void RodPart::addStartLoads()
     system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), rod_.load(*inputs_, i));
   system.evaluateWhole(false);
   system.closeGradient();
-  for (const Weld& weld : welds_)
-  {
-    const GraspState& g = rod_.work.grasps[weld.grasp];
-    if (!g.active)
-      continue;
+  forActiveWelds([&](const Weld& weld, const GraspState& g) {
     const BodySystem& body = weld.body->system;
     BodySystem::Vector6 wrench = BodySystem::Vector6::Zero();
     BodySystem::Matrix6 inertia = BodySystem::Matrix6::Zero();
@@ -49,16 +45,12 @@ void RodPart::addStartLoads()
       inertia.bottomRightCorner<3, 3>() -= m * skew(r) * skew(r);
     }
     weld.body->addStartLoad(wrench, inertia);
-  }
+  });
 }
 
 void RodPart::takeStartAcceleration()
 {
-  for (const Weld& weld : welds_)
-  {
-    const GraspState& g = rod_.work.grasps[weld.grasp];
-    if (!g.active)
-      continue;
+  forActiveWelds([&](const Weld& weld, const GraspState& g) {
     const BodySystem& body = weld.body->system;
     const BodySystem::Vector6& a = weld.body->startAcceleration();
     for (int i = g.first_node; i <= g.last_node; ++i)
@@ -66,7 +58,7 @@ void RodPart::takeStartAcceleration()
       const Eigen::Vector3d r = rod_.work.x.col(i) - body.pose.position, w = body.velocity().angular;
       rod_.work.a.col(i) = a.head<3>() + a.tail<3>().cross(r) + w.cross(w.cross(r));
     }
-  }
+  });
 }
 
 void RodPart::addSurface(ContactSurface& surface) const

@@ -50,13 +50,6 @@ Joint jointAt(const RodModel& model, const RodArrays& a, int node, int e)
   return joint;
 }
 
-/// Rest lengths of the halves of two edges that belong to a node.
-double voronoiLength(const RodModel& model, int node)
-{
-  const int edges = model.edges(), before = node > 0 ? node - 1 : (model.closed ? edges - 1 : -1);
-  return 0.5 * ((before >= 0 ? model.rest_length[before] : 0.0) + (node < edges ? model.rest_length[node] : 0.0));
-}
-
 /// Has the stiffnesses respond with the part of Rayleigh damping that the state's strain rates tell of.
 void addDamping(const RodModel& model, const RodState& state, RodSystem& system)
 {
@@ -75,7 +68,7 @@ void takeJoints(const RodModel& model, const RodState& state, const RodSystem& s
   const RodArrays& a = system.arrays();
   for (int i = 0; i < model.nodes(); ++i)
   {
-    double length = voronoiLength(model, i);
+    double length = model.voronoiLength(i);
     out.curvature.col(i) = model.rest_curvature.col(i) / length;
     out.twist[i] = model.rest_twist[i] / length;
     const bool end = !model.closed && (i == 0 || i == model.nodes() - 1);

@@ -1,13 +1,31 @@
 #include "slender_sim/thread/thread_remesh.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
 
 namespace {
+
+template <class F>
+void forNodeArrays(ThreadState& s, F&& f)
+{
+  f(s.x), f(s.v), f(s.twist), f(s.id), f(s.deposited);
+}
+
+template <class F>
+void forEdgeArrays(ThreadState& s, F&& f)
+{
+  f(s.d1), f(s.spin), f(s.volume);
+}
+
+template <class F>
+void forAllArrays(ThreadState& s, F&& f)
+{
+  forNodeArrays(s, f);
+  forEdgeArrays(s, f);
+}
 
 /// Lagrange's polynomial through (s[k], y[k]), k = 0..count-1, at s = 0.
 template <class Value>
@@ -148,14 +166,7 @@ void removeNode(ThreadState& state, int i)
   state.spin[i - 1] =
       (ve * ve / le * state.spin[i - 1] + vf * vf / lf * state.spin[i]) * joined.norm() / ((ve + vf) * (ve + vf));
   state.volume[i - 1] = ve + vf;
-  state.x.erase(state.x.begin() + i);
-  state.v.erase(state.v.begin() + i);
-  state.id.erase(state.id.begin() + i);
-  state.deposited.erase(state.deposited.begin() + i);
-  state.twist.erase(state.twist.begin() + i);
-  state.d1.erase(state.d1.begin() + i);
-  state.spin.erase(state.spin.begin() + i);
-  state.volume.erase(state.volume.begin() + i);
+  forAllArrays(state, [i](auto& v) { v.erase(v.begin() + i); });
   if (!state.ends[0].held)
     state.twist.front() = 0.0;
   if (!state.ends[1].held)
@@ -226,14 +237,9 @@ bool breakThread(ThreadState& state, double min_radius, ThreadState& older)
   state.volume[at + 1] += half;
 
   older = state;
-  const auto keepFirst = [&](auto& v, int count) { v.resize(count); };
-  const auto keepRest = [&](auto& v) { v.erase(v.begin(), v.begin() + at + 1); };
-  const auto perNode = [](ThreadState& s, auto&& f) { f(s.x), f(s.v), f(s.twist), f(s.id), f(s.deposited); };
-  const auto perEdge = [](ThreadState& s, auto&& f) { f(s.d1), f(s.spin), f(s.volume); };
-  perNode(older, [&](auto& v) { keepFirst(v, at + 1); });
-  perEdge(older, [&](auto& v) { keepFirst(v, at); });
-  perNode(state, keepRest);
-  perEdge(state, keepRest);
+  forNodeArrays(older, [&](auto& v) { v.resize(at + 1); });
+  forEdgeArrays(older, [&](auto& v) { v.resize(at); });
+  forAllArrays(state, [&](auto& v) { v.erase(v.begin(), v.begin() + at + 1); });
   older.ends[1].held = state.ends[0].held = false;
   older.twist.back() = state.twist.front() = 0.0;
   older.fed_volume = older.dropped_volume = older.left_volume = 0.0;
@@ -247,15 +253,7 @@ void dropOldest(ThreadState& state, int count, double& account)
     return;
   for (int j = 0; j < count; ++j)
     account += state.volume[j];
-  const auto drop = [&](auto& v) { v.erase(v.begin(), v.begin() + count); };
-  drop(state.x);
-  drop(state.v);
-  drop(state.id);
-  drop(state.deposited);
-  drop(state.twist);
-  drop(state.d1);
-  drop(state.spin);
-  drop(state.volume);
+  forAllArrays(state, [&](auto& v) { v.erase(v.begin(), v.begin() + count); });
   state.twist[0] = 0.0;
   state.ends[0].held = false;
 }

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include "island/island.h"
+#include "slender_sim/dynamics/failure_place.h"
 #include "thread_part.h"
 
 namespace slender {
@@ -47,12 +47,7 @@ private:
 namespace {
 
 /// "2.5 mm".
-std::string millimetres(double length)
-{
-  char text[40];
-  std::snprintf(text, sizeof text, "%.3g mm", 1e3 * length);
-  return text;
-}
+std::string millimetres(double length) { return shortNumber(1e3 * length, 3) + " mm"; }
 
 /// The smallest and the largest.
 std::pair<double, double> rangeOfRadii(const ThreadState& state)

@@ -2,7 +2,6 @@
 
 #include <string>
 
-#include "slender_sim/dynamics/newton.h"
 #include "slender_sim/thread/thread_remesh.h"
 #include "slender_sim/thread/thread_stepper.h"
 #include "slender_sim/thread/thread_system.h"

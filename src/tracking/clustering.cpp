@@ -1,7 +1,6 @@
 #include "slender_sim/tracking/clustering.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>

@@ -18,7 +18,8 @@ WorldContent checked(const WorldModel& world, WorldContent content)
       throw std::invalid_argument(what);
   };
   for (const int b : content.bodies)
-    checkBody(world.bodies[b].body);
+    if (world.bodies[b].body.simulated)
+      checkBody(world.bodies[b].body);
   bool touching_threads = false;
   for (const int k : content.threads)
   {
@@ -74,18 +75,10 @@ IslandScheduler::IslandScheduler(const WorldModel& world, WorldContent content, 
 
 // ---- what the last step leaves
 
-void IslandScheduler::addContacts(std::vector<ContactForce>& out) const
+void IslandScheduler::addContacts(ContactLoads& out) const
 {
   for (const ObjectIsland* island : islands_)
-    if (const ContactPotential* contact = island->contact())
-      for (const ContactTerm& term : contact->terms())
-        out.push_back({term.position, term.force});
-}
-
-void IslandScheduler::addSolidLoads(SolidLoads& out) const
-{
-  for (const ObjectIsland* island : islands_)
-    island->addSolidLoads(out);
+    island->addContacts(out);
 }
 
 /// On the surface points of an object that is one part [N].

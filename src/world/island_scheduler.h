@@ -28,8 +28,7 @@ public:
   /// others do not feel them. Throws std::invalid_argument if there are other cloths, or objects that track a guide.
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override;
   void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addContacts(std::vector<ContactForce>& out) const override;
-  void addSolidLoads(SolidLoads& out) const override;
+  void addContacts(ContactLoads& out) const override;
   void forgetContacts() override { islands_.clear(); }
   void setThreads(int threads) override { loop_.threads = threads; }
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override

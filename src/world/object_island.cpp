@@ -311,12 +311,13 @@ void ObjectIsland::trace()
   }
 }
 
-void ObjectIsland::addSolidLoads(SolidLoads& out) const
+void ObjectIsland::addContacts(ContactLoads& out) const
 {
   if (!contact())
     return;
   for (const ContactTerm& term : contact()->terms())
   {
+    out.contacts.push_back({term.position, term.force});
     if (term.solid < 0)
       continue;
     const WorldSolid& solid = *solids_[term.solid];

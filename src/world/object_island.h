@@ -34,8 +34,8 @@ public:
   const std::vector<int>& places() const { return places_; }   ///< of its objects
   /// Contacts of the last step; null: nothing touches.
   const ContactPotential* contact() const { return island_.equations().contact(); }
-  /// Adds what the contacts of the last step exert on obstacles and bodies.
-  void addSolidLoads(SolidLoads& out) const;
+  /// Adds the contacts of the last step, and what they exert on obstacles and bodies.
+  void addContacts(ContactLoads& out) const;
   Island& island() { return island_; }
   /// Whether its parts are worth several threads.
   bool isLarge() const;

@@ -24,10 +24,8 @@ public:
   /// Is called when all groups have made their step, and the time is that of its end. Writes into the state what
   /// follows from the step, and completes the report.
   virtual void finish(WorldState&, const WorldInputs&, StepReport&) {}
-  /// Appends the contacts of the last step.
-  virtual void addContacts(std::vector<ContactForce>&) const {}
-  /// Adds what they exert on obstacles and bodies.
-  virtual void addSolidLoads(SolidLoads&) const {}
+  /// Adds the contacts of the last step, and what they exert on obstacles and bodies.
+  virtual void addContacts(ContactLoads&) const {}
   /// The state is another one: there was no last step.
   virtual void forgetContacts() {}
   virtual void setThreads(int) {}

@@ -1,7 +1,6 @@
 #include "slender_sim/world/world.h"
 
 #include <algorithm>
-#include <exception>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -31,24 +30,6 @@ template <class Objects>
 bool anyTouches(const Objects& objects)
 {
   return std::any_of(objects.begin(), objects.end(), [](const auto& object) { return object.contact.has_value(); });
-}
-
-/// Calls `make`; what it throws becomes an error of the part.
-template <class Make>
-auto built(Kind kind, int index, const Make& make)
-{
-  try
-  {
-    return make();
-  }
-  catch (const WorldError&)
-  {
-    throw;   // tells the part already
-  }
-  catch (const std::invalid_argument& error)
-  {
-    throw WorldError(kind, index, error.what());
-  }
 }
 
 }   // namespace
@@ -132,14 +113,6 @@ public:
         place.group->check(state);
   }
 
-  std::vector<ContactForce> contacts() const
-  {
-    std::vector<ContactForce> all;
-    for (const auto& group : groups_)
-      group->addContacts(all);
-    return all;
-  }
-
   void forgetContacts()
   {
     for (const auto& group : groups_)
@@ -148,11 +121,11 @@ public:
 
   RodObject& rod(int number) const { return islands->rod(rods.at(number)); }
 
-  SolidLoads solidLoads() const
+  ContactLoads contactLoads() const
   {
-    SolidLoads all{std::vector<SolidLoad>(model.obstacles.size()), std::vector<SolidLoad>(model.bodies.size())};
+    ContactLoads all{{}, std::vector<SolidLoad>(model.obstacles.size()), std::vector<SolidLoad>(model.bodies.size())};
     for (const auto& group : groups_)
-      group->addSolidLoads(all);
+      group->addContacts(all);
     return all;
   }
 
@@ -345,8 +318,7 @@ ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eig
   return place.group->clothEnergies(place.index, state, gravity);
 }
 
-std::vector<ContactForce> World::contacts() const { return impl_->contacts(); }
-SolidLoads World::solidLoads() const { return impl_->solidLoads(); }
+ContactLoads World::contactLoads() const { return impl_->contactLoads(); }
 void World::forgetContacts() { impl_->forgetContacts(); }
 
 const FunctionSet& World::functions(int cloth, const WorldState& state) const

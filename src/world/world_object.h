@@ -6,12 +6,31 @@
 
 #include "island/part.h"
 #include "island_finder.h"
+#include "slender_sim/world/world.h"
 #include "slender_sim/world/world_model.h"
 #include "slender_sim/world/world_state.h"
 
 namespace slender {
 
 struct Meeting;
+
+/// Calls make(). An std::invalid_argument becomes a WorldError of this part, unless it tells the part already.
+template <class Make>
+auto built(FailurePlace::Kind kind, int index, const Make& make)
+{
+  try
+  {
+    return make();
+  }
+  catch (const WorldError&)
+  {
+    throw;
+  }
+  catch (const std::invalid_argument& error)
+  {
+    throw WorldError(kind, index, error.what());
+  }
+}
 
 /// A rod, a thread, a cloth or a simulated body: something of which an island has parts.
 class WorldObject

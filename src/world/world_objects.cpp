@@ -15,20 +15,6 @@ bool isSound(const GraspTarget& t)
          (!t.velocity || (t.velocity->linear.allFinite() && t.velocity->angular.allFinite()));
 }
 
-/// Calls make(). An std::invalid_argument becomes a WorldError of this object.
-template <class Make>
-void withPlace(FailurePlace::Kind kind, int index, const Make& make)
-{
-  try
-  {
-    make();
-  }
-  catch (const std::invalid_argument& error)
-  {
-    throw WorldError(kind, index, error.what());
-  }
-}
-
 /// The bodies, and the rods that may meet something.
 WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
 {
@@ -109,9 +95,9 @@ void WorldObjects::addObjects(const TimeConfig& time)
     if (world.bodies[b].body.simulated)
       add(bodies.emplace_back(world, b));
   for (const int r : content.rods)
-    withPlace(FailurePlace::Kind::rod, r, [&] { add(rods.emplace_back(world, r, time)); });
+    built(FailurePlace::Kind::rod, r, [&] { add(rods.emplace_back(world, r, time)); });
   for (const int c : content.cloths)
-    withPlace(FailurePlace::Kind::cloth, c, [&] { add(cloths.emplace_back(world, c)); });
+    built(FailurePlace::Kind::cloth, c, [&] { add(cloths.emplace_back(world, c)); });
   for (const int k : content.threads)
     add(threads.emplace_back(world, k));
 }

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <vector>
-
 #include "object_island.h"
 #include "world_objects.h"
 #include "slender_sim/dynamics/equilibrium_search.h"

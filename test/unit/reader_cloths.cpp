@@ -40,7 +40,7 @@ TEST(ClothReader, ReadsEverything)
   EXPECT_NEAR(c.membrane.c33, 2e5 * 4e-4 / (2 * 1.25), 1e-9);
   EXPECT_EQ(c.bending, BendingModel::hinge);
   EXPECT_NEAR(c.bending_modulus, 2e5 * 64e-12 / (12 * (1 - 0.0625)), 1e-18);
-  EXPECT_EQ(c.drag, 0.8);
+  EXPECT_EQ(c.wind_coefficient, 0.8);
   EXPECT_EQ(c.solver, ClothSolver::cholesky);
   EXPECT_EQ(c.linear_tolerance, 0.01);
   EXPECT_EQ(scene.time.integrator, Integrator::implicit_euler);

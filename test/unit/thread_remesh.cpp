@@ -170,7 +170,7 @@ TEST(ThreadRemesh, DroppingCountsTheVolume)
   const double volume = s.totalVolume();
   dropOldest(s, 3, s.dropped_volume);
   EXPECT_EQ(s.nodes(), 6);
-  EXPECT_EQ(s.firstId(), 3u);
+  EXPECT_EQ(s.id.front(), 3u);
   EXPECT_NEAR(s.totalVolume() + s.dropped_volume, volume, 1e-15);
   EXPECT_EQ(s.left_volume, 0.0);
   dropOldest(s, 100, s.left_volume);

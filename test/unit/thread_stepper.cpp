@@ -355,7 +355,7 @@ TEST(ThreadStepper, TheBeltCarriesTheThreadAway)
   EXPECT_LT(most, 200u);
   EXPECT_GT(t.state.left_volume, t.state.totalVolume());
   EXPECT_LT(std::abs(volumeDrift(t, start)), 1e-11);
-  EXPECT_GT(t.state.firstId(), 50u);
+  EXPECT_GT(t.state.id.front(), 50u);
   // laid down faster than it falls, it lies straight
   EXPECT_NEAR(t.state.x.front().y(), 0.0, 1e-4);
 }

@@ -58,31 +58,36 @@ struct PrescribedAverages
   int count() const { return static_cast<int>(weights->rows()); }
 };
 
-/// Fixed properties of one cloth (thesis 2).
-struct ClothModel
+/// What a cloth is like, apart from its shape and mass.
+struct ClothProperties
 {
-  std::string name;
-  TriangleMesh rest;   ///< the undeformed shape
-  MeshTopology topology;
-  Eigen::VectorXd mass;                              ///< per vertex [kg]
   MembraneModuli membrane;                           ///< [N/m]
-  Eigen::Vector3d warp = Eigen::Vector3d::UnitX();   ///< direction in the rest shape
+  Eigen::Vector3d warp = Eigen::Vector3d::UnitX();   ///< direction in the rest shape; of a grid the first side
   BendingModel bending = BendingModel::isometric_nonconforming;
   double bending_modulus = 0.0;   ///< D [N m], as in plate theory (see bendingCalibration)
   /// Of bending, in (-1, 1): the plate energy D/2 [(k1 + k2)^2 - 2 (1 - nu) k1 k2] with the principal curvatures k1 and
   /// k2 (see plateBending()). Empty: the bending model has the ratio of its discretisation, about -1/3 (nonconforming,
   /// hinges) or 1 (conforming).
   std::optional<double> bending_poissons_ratio;
-  /// One per face, not 0 for faces that do not bend while all their vertices are pins of the state; empty: none. Their
-  /// edges to other faces are then clamped edges (see hingeArea()). Once a pin of theirs is released they bend like the
-  /// rest. See clampFaces(). Not for conforming bending.
-  std::vector<char> clamped_faces;
-  Eigen::Matrix3Xd undeformed;   ///< 3 x n: its bend angles are those at rest; empty: those of `rest`
+  Eigen::Matrix3Xd undeformed;   ///< 3 x n: its bend angles are those at rest; empty: those of the rest shape
   Plasticity plasticity;
   double mass_damping = 0.0;        ///< Rayleigh [1/s]
   double stiffness_damping = 0.0;   ///< Rayleigh [s]
   double wind_coefficient = 0.0;    ///< [N s/m^3]: pressure per normal velocity of the air against the cloth
   Aerodynamics aerodynamics;        ///< in addition
+};
+
+/// Fixed properties of one cloth (thesis 2).
+struct ClothModel : ClothProperties
+{
+  std::string name;
+  TriangleMesh rest;   ///< the undeformed shape
+  MeshTopology topology;
+  Eigen::VectorXd mass;   ///< per vertex [kg]
+  /// One per face, not 0 for faces that do not bend while all their vertices are pins of the state; empty: none. Their
+  /// edges to other faces are then clamped edges (see hingeArea()). Once a pin of theirs is released they bend like the
+  /// rest. See clampFaces(). Not for conforming bending.
+  std::vector<char> clamped_faces;
 
   /// sets of them, of which that of the state (ClothState::average_set) acts; empty: none
   std::vector<PrescribedAverages> averages;

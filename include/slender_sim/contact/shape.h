@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <variant>
-#include <vector>
 
 #include <Eigen/Core>
 

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <variant>
-#include <vector>
 
 #include <Eigen/Core>
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "slender_sim/linalg/isa.h"
+
 /// Structure-of-arrays view of the constraints c_j = (|e_j|^2 - L_j^2) / (2 L_j) = 0 of one chain, for the hot loops of
 /// FastProjection. Edge j runs from node j to j+1. Every array is readable from index -kHalo to nodes + kHalo; of a
 /// closed chain the halo repeats it.
@@ -38,15 +40,7 @@ struct ChainKernels
   void (*apply)(const ChainArrays& chain);
 };
 
-namespace baseline {
-extern const ChainKernels kChainKernels;
-}
-namespace avx2 {
-extern const ChainKernels kChainKernels;
-}
-namespace avx512 {
-extern const ChainKernels kChainKernels;
-}
+SLENDER_DECLARE_KERNELS(ChainKernels, kChainKernels)
 
 /// The table for this machine.
 const ChainKernels& chainKernels();

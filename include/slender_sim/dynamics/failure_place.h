@@ -39,6 +39,9 @@ private:
   double value_ = -1.0;
 };
 
+/// "1.5e-3" rather than "0.001500", with so many significant digits at most.
+std::string shortNumber(double value, int digits = 10);
+
 /// "(0.1, -2, 0.3) m", for messages.
 std::string metres(const Eigen::Vector3d& position);
 

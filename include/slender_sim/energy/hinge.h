@@ -28,7 +28,6 @@ public:
   int count() const { return static_cast<int>(hinges_.cols()); }
   const Eigen::Matrix4Xi& hinges() const { return hinges_; }
   double stiffness(int hinge) const { return stiffness_[hinge]; }
-  double restAngle(int hinge) const { return rest_angle_[hinge]; }
   void setStiffness(int hinge, double stiffness) { stiffness_[hinge] = response_stiffness_[hinge] = stiffness; }
   void setRestAngle(int hinge, double angle) { rest_angle_[hinge] = response_rest_[hinge] = angle; }
 

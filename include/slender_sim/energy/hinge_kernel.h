@@ -1,5 +1,7 @@
 #pragma once
 
+#include "slender_sim/linalg/isa.h"
+
 /// Structure-of-arrays view of the hinges of a mesh for the hot loops: E = sum 1/2 k (theta - rest)^2, theta the angle
 /// between the normals of two faces. Points have 4 doubles. Arrays are padded to whole packs of 8 with copies of the
 /// last hinge that have k = 0.
@@ -29,15 +31,7 @@ struct HingeKernels
                                 double* values);
 };
 
-namespace baseline {
-extern const HingeKernels kHingeKernels;
-}
-namespace avx2 {
-extern const HingeKernels kHingeKernels;
-}
-namespace avx512 {
-extern const HingeKernels kHingeKernels;
-}
+SLENDER_DECLARE_KERNELS(HingeKernels, kHingeKernels)
 
 /// The table for this machine.
 const HingeKernels& hingeKernels();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "slender_sim/linalg/isa.h"
+
 /// Structure-of-arrays view of a naturally straight, isotropic rod for the hot loops (thesis 4.2, special case).
 /// Indices as in RodArrays: edge j follows node j, joint i sits at node i. Every array is readable from -kHalo to nodes
 /// + kHalo. Energy:
@@ -45,15 +47,7 @@ struct IsotropicKernels
   void (*turn)(const IsotropicArrays& rod, int from, int to);
 };
 
-namespace baseline {
-extern const IsotropicKernels kIsotropicKernels;
-}
-namespace avx2 {
-extern const IsotropicKernels kIsotropicKernels;
-}
-namespace avx512 {
-extern const IsotropicKernels kIsotropicKernels;
-}
+SLENDER_DECLARE_KERNELS(IsotropicKernels, kIsotropicKernels)
 
 /// The table for this machine.
 const IsotropicKernels& isotropicKernels();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "slender_sim/linalg/banded_ldlt.h"
+#include "slender_sim/linalg/isa.h"
 
 namespace slender {
 
@@ -75,15 +76,7 @@ struct RodKernels
   RodEvaluation (*end)(const RodSweep& sweep);
 };
 
-namespace baseline {
-extern const RodKernels kRodKernels;
-}
-namespace avx2 {
-extern const RodKernels kRodKernels;
-}
-namespace avx512 {
-extern const RodKernels kRodKernels;
-}
+SLENDER_DECLARE_KERNELS(RodKernels, kRodKernels)
 
 /// The table for this machine.
 const RodKernels& rodKernels();

@@ -26,7 +26,6 @@ public:
   int edges() const { return static_cast<int>(t_.cols()); }
   const Eigen::Matrix3Xd& positions() const { return x_; }
   const Eigen::Matrix3Xd& tangents() const { return t_; }
-  const Eigen::Matrix3Xd& referenceDirectors() const { return u_; }   ///< first directors; the second is t x u
 
   /// Moves the nodes; reference frames follow by parallel transport in time (3.17) and the reference twist accumulates,
   /// unwrapped, so that any number of full turns survives. Throws std::invalid_argument when a tangent turns over; the

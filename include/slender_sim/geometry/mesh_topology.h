@@ -28,8 +28,4 @@ struct MeshTopology
 /// meshDefects).
 MeshTopology meshTopology(const TriangleMesh& mesh);
 
-/// Turns faces over so that all of a connected part agree with its first one; returns how many. Throws
-/// std::invalid_argument where that is impossible (a Moebius strip) or an edge has more than two faces.
-int orientFaces(TriangleMesh& mesh);
-
 }   // namespace slender

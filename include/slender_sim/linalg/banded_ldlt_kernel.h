@@ -1,5 +1,7 @@
 #pragma once
 
+#include "slender_sim/linalg/isa.h"
+
 namespace slender {
 
 template <int HalfBandwidth, int Block>
@@ -16,14 +18,6 @@ struct BandKernels
   void (*solve8)(const BandPanel<10, 4>* panels, int blocks, double* x);
 };
 
-namespace baseline {
-extern const BandKernels kBandKernels;
-}
-namespace avx2 {
-extern const BandKernels kBandKernels;
-}
-namespace avx512 {
-extern const BandKernels kBandKernels;
-}
+SLENDER_DECLARE_KERNELS(BandKernels, kBandKernels)
 
 }   // namespace slender

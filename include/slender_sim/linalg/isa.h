@@ -28,6 +28,18 @@ const Table& pickKernels(const Table& baseline, const Table& avx2, const Table& 
 
 }   // namespace slender
 
+/// Declares the table `kernels` of each instruction set.
+#define SLENDER_DECLARE_KERNELS(Table, kernels) \
+  namespace baseline {                          \
+  extern const Table kernels;                   \
+  }                                             \
+  namespace avx2 {                              \
+  extern const Table kernels;                   \
+  }                                             \
+  namespace avx512 {                            \
+  extern const Table kernels;                   \
+  }
+
 /// The table `kernels` for this processor. Each file *_kernel.cpp is compiled once per instruction set and defines a
 /// table of this name in the namespace of that set; without x86 there is only the baseline.
 #ifdef SLENDER_X86_KERNELS

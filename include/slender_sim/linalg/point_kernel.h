@@ -1,5 +1,7 @@
 #pragma once
 
+#include "slender_sim/linalg/isa.h"
+
 /// Products of the sparse matrices of points. Points have 4 doubles, the last of them unused; vectors are aligned to 64
 /// bytes.
 namespace slender {
@@ -51,15 +53,7 @@ struct PointKernels
   double (*dot)(int points, const double* x, const double* y);
 };
 
-namespace baseline {
-extern const PointKernels kPointKernels;
-}
-namespace avx2 {
-extern const PointKernels kPointKernels;
-}
-namespace avx512 {
-extern const PointKernels kPointKernels;
-}
+SLENDER_DECLARE_KERNELS(PointKernels, kPointKernels)
 
 /// The table for this machine.
 const PointKernels& pointKernels();

@@ -54,7 +54,6 @@ private:
 
   const std::string prefix_;
   std::string path_, rods_topic_, threads_topic_, cloths_topic_, mesh_topic_;
-  std::string scene_topic_, inputs_topic_, bodies_topic_, grasps_topic_, obstacles_topic_, fields_topic_;
   std::vector<std::string> wrench_topics_, nozzle_topics_, notes_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;

@@ -32,6 +32,27 @@ geometry_msgs::Wrench toMessage(const Wrench& wrench);
 geometry_msgs::Twist toMessage(const Twist& twist);
 
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p);
+Eigen::Vector3d fromMessage(const geometry_msgs::Vector3& v);
+/// Not normalised.
+Eigen::Quaterniond fromMessage(const geometry_msgs::Quaternion& q);
+/// Not normalised: the very numbers that were recorded.
+Pose recordedPose(const geometry_msgs::Pose& message);
+
+/// Returns points or vectors first .. last - 1 as columns.
+template <class Vectors>
+Eigen::Matrix3Xd columnsOf(const Vectors& from, std::size_t first, std::size_t last)
+{
+  Eigen::Matrix3Xd out(3, static_cast<Eigen::Index>(last - first));
+  for (std::size_t i = first; i < last; ++i)
+    out.col(static_cast<Eigen::Index>(i - first)) = fromMessage(from[i]);
+  return out;
+}
+
+template <class Vectors>
+Eigen::Matrix3Xd columnsOf(const Vectors& from)
+{
+  return columnsOf(from, 0, from.size());
+}
 
 /// Why a pose from a message cannot be used.
 enum class PoseFault

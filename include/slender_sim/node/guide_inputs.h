@@ -23,9 +23,8 @@
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/hand_markers.h"
 #include "slender_sim/node/input_replay.h"
+#include "slender_sim/node/message_intake.h"
 #include "slender_sim/node/node_options.h"
-#include "slender_sim/node/paused_messages.h"
-#include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/node/tf_inputs.h"
@@ -89,7 +88,7 @@ public:
   std::vector<Handle> handles(const Simulation& simulation) const;
 
   const DropCounter& drops() const { return drops_; }
-  bool waiting() const { return !pending_.empty() || !hand_.empty() || tracking_->waiting(); }
+  bool waiting() const { return intake_.waiting() || !hand_.empty() || tracking_->waiting(); }
 
   using Age = TrackingInputs::Age;
   /// Returns "NAME for grasp G" for each body that an object follows by the topic `bodies`, as long as no message has
@@ -114,7 +113,7 @@ private:
   // recorded_inputs.cpp
   void taken(slender_sim::Input input) const;
   void takenPose(std::size_t guided, double time, const Pose& X_WH) const;
-  void takenVector(std::uint8_t kind, std::size_t thread, const Eigen::Vector3d& v) const;
+  void takenValues(std::uint8_t kind, std::size_t thread, const std::vector<double>& values) const;
 
   // buffer: nullptr if not driven from outside; frame: tf frame that is followed, empty if driven by messages
   struct Guided
@@ -128,11 +127,8 @@ private:
     int guided;
     Pose X_FH;
   };   // a gripper, body or obstacle in the frame of the message
-  struct Message
+  struct Message : FramedMessage
   {
-    int source;   // messages of one source keep their order
-    std::string what, frame;
-    ros::Time stamp;
     std::vector<Entry> entries;
   };
 
@@ -146,7 +142,6 @@ private:
   bool isDraggable(std::size_t guided) const;
   std::string handleName(std::size_t guided) const;
   std::optional<Eigen::Vector3d> velocityOf(const geometry_msgs::Vector3Stamped& message, const std::string& what);
-  void takeNow(const Message& message);
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
   Pose poseOf(const Simulation& simulation, std::size_t guided) const;
@@ -159,13 +154,11 @@ private:
   void followFrames();
   void shareLag();
   std::string kindOf(std::size_t guided) const;
-  bool checkPose(const geometry_msgs::Pose& message, const std::string& what, const std::string& whose, Pose& X);
-  void take(int source, const std::string& what, const std_msgs::Header& header, std::vector<Entry> entries);
   std::vector<std::string> guidedKeys() const;
   void takeOver(GuideInputs& before);
-  void dropTransform(PoseFault fault, const std::string& what, const std::string& frame);
-  /// False when the transform is not known yet.
-  bool deliver(const Message& message, std::string* why);
+  Use use(const Message& message, const Pose& X_WF);
+  /// Returns false when the pose is not later than the last one.
+  bool takePose(std::size_t guided, double time, const Pose& X_WH);
 
   static constexpr int kGuidesSource = -1, kBodiesSource = -2;
 
@@ -191,12 +184,11 @@ private:
     std::string frame;
   };
   std::map<std::size_t, Dragged> hand_;   // per guided, not taken yet
-  PendingMessages<Message> pending_;
-  PausedMessages<Message> paused_;
   DropCounter drops_;
   std::shared_ptr<tf2_ros::Buffer> shared_tf_buffer_;   // an edited scene keeps it
   tf2_ros::Buffer& tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  MessageIntake<Message> intake_;
   std::unique_ptr<TfInputs> tf_;
   std::unique_ptr<TrackingInputs> tracking_;
   std::vector<ros::Subscriber> subscribers_;

@@ -14,6 +14,8 @@ namespace slender {
 /// Takes note of an input that took effect.
 using InputSink = std::function<void(slender_sim::Input)>;
 
+slender_sim::Input makeInput(std::uint8_t kind, std::vector<double> values = {});
+
 /// A recorded run that is to be repeated: its scene, its first stamp, and what changed it from outside, in order.
 class InputReplay
 {

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <std_msgs/ColorRGBA.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "slender_sim/scene/snapshot_meshes.h"

@@ -11,7 +11,7 @@
 namespace slender {
 
 /// Messages that wait for their transforms. Those of one source and frame keep their order; others may overtake them,
-/// so that a frame that nobody knows holds back nothing else.
+/// so that a frame that nobody knows holds back nothing else. `Message` has the members `source` and `frame`.
 template <class Message>
 class PendingMessages
 {
@@ -26,14 +26,15 @@ public:
   bool empty() const { return waiting_.empty(); }
   void clear() { waiting_.clear(); }
 
-  bool holds(int source, const std::string& frame) const { return count(source, frame) > 0; }
+  /// Returns true if messages of the same source and frame wait.
+  bool holds(const Message& message) const { return countLike(message) > 0; }
 
   /// False when too many wait.
-  bool add(int source, const std::string& frame, Message message)
+  bool add(const Message& message)
   {
-    if (waiting_.size() >= most_ || 4 * count(source, frame) >= most_)
+    if (waiting_.size() >= most_ || 4 * countLike(message) >= most_)
       return false;
-    waiting_.push_back({source, frame, std::move(message), std::chrono::steady_clock::now() + patience_});
+    waiting_.push_back({message, std::chrono::steady_clock::now() + patience_});
     return true;
   }
 
@@ -48,10 +49,11 @@ public:
     {
       const Entry& entry = waiting_[i];
       std::string why;
-      const bool done = !blocked.count({entry.source, entry.frame}) && deliver(entry.message, &why);
-      if (!done && (blocked.count({entry.source, entry.frame}) || now < entry.deadline))
+      const std::pair key(entry.message.source, entry.message.frame);
+      const bool done = !blocked.count(key) && deliver(entry.message, &why);
+      if (!done && (blocked.count(key) || now < entry.deadline))
       {
-        blocked.insert({entry.source, entry.frame});
+        blocked.insert(key);
         ++i;
         continue;
       }
@@ -61,28 +63,27 @@ public:
     }
   }
 
-  /// Calls change(source, message) for each waiting message. It may change its arguments. If it returns false, the
-  /// message is dropped.
+  /// Calls change(message) for each waiting message. It may change its argument. If it returns false, the message is
+  /// dropped.
   template <class Change>
   void change(const Change& change)
   {
-    const auto lost = [&](Entry& entry) { return !change(entry.source, entry.message); };
+    const auto lost = [&](Entry& entry) { return !change(entry.message); };
     waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(), lost), waiting_.end());
   }
 
 private:
   struct Entry
   {
-    int source;
-    std::string frame;
     Message message;
     std::chrono::steady_clock::time_point deadline;
   };
 
-  std::size_t count(int source, const std::string& frame) const
+  std::size_t countLike(const Message& message) const
   {
-    return static_cast<std::size_t>(std::count_if(
-        waiting_.begin(), waiting_.end(), [&](const Entry& e) { return e.source == source && e.frame == frame; }));
+    return static_cast<std::size_t>(std::count_if(waiting_.begin(), waiting_.end(), [&](const Entry& e) {
+      return e.message.source == message.source && e.message.frame == message.frame;
+    }));
   }
 
   std::size_t most_;

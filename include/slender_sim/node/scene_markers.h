@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 #include <visualization_msgs/MarkerArray.h>
 
 #include "slender_sim/node/node_options.h"

@@ -79,8 +79,8 @@ private:
   // scene_node_limits.cpp
   bool mindLimits(const std::vector<LimitExcess>& begun);   // returns false if the simulation must stop
   void letInputsGoOn();                                     // after `on_limit: hold`
-  void addLimits(diagnostic_msgs::DiagnosticStatus& status) const;
 
+  void publishClock();
   void publishState();
   void publishObjects();
   bool isHeard() const;
@@ -91,7 +91,7 @@ private:
   void work();
   void tell();   // markers and diagnostics, when they are due
   void waitForCallbacks();
-  void recordingFailed(const std::string& reason);
+  void writeBag(const std::function<void(BagRecorder&)>& write);
   void summary() const;
 
   // scene_node_frames.cpp
@@ -110,6 +110,7 @@ private:
   std::uint64_t realign();   // skips the time that passed while the scene stood still; returns the ticks skipped
   void skip(std::uint64_t ticks);
   double stampLag() const;   // [s]
+  void skipToPresent();      // realigns, and records how many ticks were skipped
   void keepUp();             // ~max_lag
   ros::WallDuration untilDue() const;
 
@@ -162,6 +163,7 @@ private:
   std::string clockWentBack() const;               ///< message if /clock went back; otherwise empty
   std::string paceNote() const;                    ///< line of the legend: how much slower than real time
   void remindOfInputs();                           ///< warns of bodies and frames without a first pose
+  void addLimits(diagnostic_msgs::DiagnosticStatus& status) const;
   diagnostic_msgs::DiagnosticStatus simulationStatus() const;
   diagnostic_msgs::DiagnosticStatus inputStatus();
 

@@ -13,9 +13,8 @@
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/guide_buffer.h"
 #include "slender_sim/node/input_replay.h"
+#include "slender_sim/node/message_intake.h"
 #include "slender_sim/node/node_options.h"
-#include "slender_sim/node/paused_messages.h"
-#include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/point_guide_buffer.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/node/tf_inputs.h"
@@ -42,8 +41,8 @@ public:
   double wantedLag() const;
   /// Sets a lower bound [s] of the lag of all guides.
   void lagAtLeast(double lag);
-  void processPending();
-  bool waiting() const { return !pending_.empty(); }
+  void processPending() { intake_.processPending(); }
+  bool waiting() const { return intake_.waiting(); }
   /// Sets the guides that are driven from outside to their places at `time` [s since the clock's start].
   void apply(double time, SceneInputs& inputs);
   /// Call it after a state was loaded, because all objects may have moved.
@@ -55,8 +54,8 @@ public:
   void skip(double seconds);
 
   // These functions have the same meaning as in GuideInputs.
-  void onPresent(std::function<ros::Time()> present) { paused_.onPresent(std::move(present)); }
-  void takeKept(bool all);
+  void onPresent(std::function<ros::Time()> present) { intake_.onPresent(std::move(present)); }
+  void takeKept(bool all) { intake_.takeKept(all); }
   void onTaken(InputSink sink) { sink_ = std::move(sink); }
   void stopListening() { subscribers_.clear(); }
   void repeat(const slender_sim::Input& input);
@@ -92,13 +91,10 @@ private:
     double gap_start = 0.0, gap_duration = 0.0;
     bool heard() const;   // from any body
   };
-  struct Message
+  struct Message : FramedMessage   // its source is the index of the guide
   {
-    int guide;
-    std::string frame;
-    ros::Time stamp;
-    Eigen::Matrix3Xd points;   // in the message's frame
-    std::vector<std::pair<int, Pose>> bodies;
+    Eigen::Matrix3Xd points{};   // in the message's frame
+    std::vector<std::pair<int, Pose>> bodies{};
   };
 
   void takenPoints(int guide, double time, const Eigen::Matrix3Xd& points) const;
@@ -106,20 +102,18 @@ private:
   void addGuide(const GuideConfig& config, const Eigen::Matrix3Xd& now, Guide guide);
   void onPoints(int guide, const sensor_msgs::PointCloud2& message);
   void onBodies(int guide, const slender_sim::BodyStates& message);
-  void take(Message message, const std_msgs::Header& header);
-  void takeNow(const Message& message);
-  bool deliver(const Message& message, std::string* why);
+  Use use(const Message& message, const Pose& X_WF);
+  /// Returns false when the pose is not later than the last one.
+  bool takeBody(int guide, int body, double time, const Pose& X_WH);
   void start(Guide& guide, const Eigen::Matrix3Xd& vertices) const;
   void placeBodies(Guide& guide, double time, Eigen::Matrix3Xd& vertices) const;
 
   const NodeOptions& options_;
   const GuideBuffer::Options buffers_;
   const SimClock& clock_;
-  const tf2_ros::Buffer& tf_;
   DropCounter& drops_;
   std::vector<Guide> guides_;
-  PendingMessages<Message> pending_;
-  PausedMessages<Message> paused_;
+  MessageIntake<Message> intake_;
   std::vector<ros::Subscriber> subscribers_;
   InputSink sink_;
 };

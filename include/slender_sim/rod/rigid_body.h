@@ -8,12 +8,11 @@
 
 namespace slender {
 
-/// Fixed properties of a rigid body. Its frame has its origin at the centre of mass.
-struct RigidBodyModel
+/// What matters of a rigid body if forces move it. Its frame has its origin at the centre of mass.
+struct BodyProperties
 {
   std::string name;
-  bool simulated = true;   ///< false: its motion is given from outside, mass and loads do not matter
-  double mass = 1.0;       ///< [kg] > 0
+  double mass = 1.0;   ///< [kg] > 0
   /// about the centre of mass, body axes [kg m^2], positive definite and physical
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();
   bool gravity = true;
@@ -23,9 +22,15 @@ struct RigidBodyModel
   double angular_damping = 0.0;      ///< torque -c I omega, about [1/s]
 };
 
-/// Throws std::invalid_argument naming what is wrong: mass or inertia not positive, an inertia that no distribution of
-/// mass has (the sum of two principal moments less than the third), numbers not finite.
-void checkBody(const RigidBodyModel& body);
+/// Fixed properties of a rigid body.
+struct RigidBodyModel : BodyProperties
+{
+  bool simulated = true;   ///< false: its motion is given from outside, and mass and loads do not matter
+};
+
+/// Throws std::invalid_argument naming what is wrong with a simulated body: mass or inertia not positive, an inertia
+/// that no distribution of mass has (the sum of two principal moments less than the third), numbers not finite.
+void checkBody(const BodyProperties& body);
 
 /// Everything that changes while a body moves.
 struct RigidBodyState

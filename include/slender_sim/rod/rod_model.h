@@ -39,6 +39,12 @@ struct RodModel
   int nodes() const { return static_cast<int>(mass.size()); }
   int edges() const { return static_cast<int>(rest_length.size()); }
   double totalMass() const { return mass.sum(); }
+  /// Rest lengths of the halves of two edges that belong to a node; at an end of an open rod, of one.
+  double voronoiLength(int node) const
+  {
+    const int before = node > 0 ? node - 1 : (closed ? edges() - 1 : -1);
+    return 0.5 * ((before >= 0 ? rest_length[before] : 0.0) + (node < edges() ? rest_length[node] : 0.0));
+  }
   bool damped() const { return mass_damping > 0 || drag.size() > 0; }
   /// Of a node's velocity against air at rest [N s/m].
   double damping(int node) const { return mass_damping * mass[node] + (drag.size() > 0 ? drag[node] : 0.0); }

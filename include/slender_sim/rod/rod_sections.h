@@ -1,8 +1,5 @@
 #pragma once
 
-#include <limits>
-#include <vector>
-
 #include <Eigen/Core>
 
 #include "slender_sim/rod/rod_model.h"

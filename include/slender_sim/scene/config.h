@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,6 +17,7 @@
 #include "slender_sim/geometry/number_table.h"
 #include "slender_sim/geometry/pose.h"
 #include "slender_sim/geometry/pose_trajectory.h"
+#include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/scene/limits_config.h"
 #include "slender_sim/scene/record_fields.h"
@@ -39,7 +39,7 @@ struct StraightCurve
   int edges = 50;
   double grading = 1;
 };
-/// resampled when edges is given
+/// from the scene or from a CSV file; resampled when edges is given
 struct PolylineCurve
 {
   std::vector<Eigen::Vector3d> points;
@@ -64,13 +64,6 @@ struct CatenaryCurve
   double length = 1.2;
   int edges = 50;
 };
-/// CSV: x,y,z per line
-struct FileCurve
-{
-  std::string path;
-  std::vector<Eigen::Vector3d> points;
-  std::optional<int> edges;
-};
 /// See geometry/curves.h for the next three.
 struct TrefoilCurve
 {
@@ -93,7 +86,7 @@ struct VeeCurve
   int edges = 50;
 };
 using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve,
-                           TorusKnotCurve, VeeCurve, FileCurve>;
+                           TorusKnotCurve, VeeCurve>;
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
 struct CrossSection
@@ -281,21 +274,15 @@ struct WeldConfig
   int rod = 0, first_node = 0, last_node = 0;
 };
 
-struct BodyConfig
+/// The properties do not matter unless the body is simulated.
+struct BodyConfig : BodyProperties
 {
-  std::string name;
-  /// [kg]; no matter unless simulated, like inertia and loads
-  double mass = 1.0;
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Identity();   ///< about the centre of mass, body axes [kg m^2]
   std::optional<Shape> shape;
   Pose X_BS;   ///< the shape in the body's frame
   /// of the body's frame at the start; simulated: centre of mass
   Pose pose;
-  Twist velocity;   ///< at the start
-  bool gravity = true;
-  Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};      ///< constant, world axes, at the centre of mass [N], [N m]
-  double linear_damping = 0.0, angular_damping = 0.0;   ///< [1/s]
-  std::optional<GivenMotion> motion;                    ///< nothing: simulated
+  Twist velocity;                      ///< at the start
+  std::optional<GivenMotion> motion;   ///< nothing: simulated
   /// Its shape touches rods, threads and cloths; that of a simulated body also obstacles and other bodies.
   bool contact = true;
   std::optional<double> friction;   ///< [-]; nothing: that of the rod; against solids 0.3
@@ -380,27 +367,15 @@ struct ClothGrid
 
 /// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it
 /// moves with its motion, and the vertices rigidly with it.
-struct ClothConfig
+struct ClothConfig : ClothProperties
 {
   std::string name;
   std::string place;                 ///< "FILE:LINE: PATH" for messages; empty when not read from a file
   TriangleMesh mesh;                 ///< undeformed [m]
   Eigen::Matrix3Xd start;            ///< vertices where the scene starts [m]; empty: those of the mesh
   Eigen::Matrix3Xd start_velocity;   ///< of the vertices [m/s]; empty: at rest
-  /// vertices of the shape whose bend angles are those at rest; empty: those of the mesh
-  Eigen::Matrix3Xd undeformed;
-  std::optional<ClothGrid> grid;   ///< that the mesh was made from
-  double area_density = 0.15;      ///< [kg/m^2]
-  MembraneModuli membrane;
-  Eigen::Vector3d warp{1, 0, 0};   ///< direction in the undeformed shape; of a grid the first side
-  BendingModel bending = BendingModel::isometric_nonconforming;
-  double bending_modulus = 0.0;                   ///< D [N m]
-  std::optional<double> bending_poissons_ratio;   ///< of bending, in (-1, 1); empty: that of the discretisation
-  Plasticity plasticity;
-  double mass_damping = 0.0;        ///< [1/s]
-  double stiffness_damping = 0.0;   ///< [s]
-  Aerodynamics aerodynamics;
-  double drag = 0.0;   ///< pressure per velocity along the normal, against the air [N s/m^3]
+  std::optional<ClothGrid> grid;     ///< that the mesh was made from
+  double area_density = 0.15;        ///< [kg/m^2]
   ClothSolver solver = ClothSolver::automatic;
   bool one_newton_step = false;
   double linear_tolerance = 5e-3;

@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "slender_sim/scene/config.h"
 #include "slender_sim/scene/simulation.h"

@@ -41,7 +41,6 @@ struct ThreadState
 
   int nodes() const { return static_cast<int>(x.size()); }
   int edges() const { return static_cast<int>(volume.size()); }
-  std::uint64_t firstId() const { return id.empty() ? next_id : id.front(); }
   Eigen::Vector3d edge(int j) const { return x[j + 1] - x[j]; }
   double radius(int j) const { return std::sqrt(volume[j] / (M_PI * edge(j).norm())); }
   double totalVolume() const

@@ -72,9 +72,9 @@ public:
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const;
 
   /// Contacts by the barrier in the last step.
-  std::vector<ContactForce> contacts() const;
-  /// What they exert on obstacles and bodies.
-  SolidLoads solidLoads() const;
+  std::vector<ContactForce> contacts() const { return contactLoads().contacts; }
+  /// The same, and what they exert on obstacles and bodies.
+  ContactLoads contactLoads() const;
   /// All forces of contact are zero until the next step: the state has become another one.
   void forgetContacts();
 

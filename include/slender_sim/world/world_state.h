@@ -88,9 +88,10 @@ struct SolidLoad
   }
 };
 
-/// The loads on all obstacles and bodies.
-struct SolidLoads
+/// Contacts by the barrier, and their loads on all obstacles and bodies.
+struct ContactLoads
 {
+  std::vector<ContactForce> contacts;
   std::vector<SolidLoad> obstacles, bodies;
 };
 

@@ -29,7 +29,7 @@ bool endsMeet(const Eigen::Matrix3Xd& nodes)
 
 Eigen::Matrix3Xd dropLast(const Eigen::Matrix3Xd& nodes) { return nodes.leftCols(nodes.cols() - 1); }
 
-/// Points of the curve. With `edges` the formulas use that number instead of their own (polylines and files keep their
+/// Points of the curve. With `edges` the formulas use that number instead of their own (polylines keep their
 /// points).
 Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity, std::optional<int> edges)
 {
@@ -76,17 +76,10 @@ Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity,
       curve);
 }
 
-bool isSampled(const Curve& curve)
-{
-  return std::holds_alternative<PolylineCurve>(curve) || std::holds_alternative<FileCurve>(curve);
-}
-
 std::optional<int> sampledEdges(const Curve& curve)
 {
-  if (const auto* polyline = std::get_if<PolylineCurve>(&curve))
-    return polyline->edges;
-  const auto* file = std::get_if<FileCurve>(&curve);
-  return file ? file->edges : std::nullopt;
+  const auto* polyline = std::get_if<PolylineCurve>(&curve);
+  return polyline ? polyline->edges : std::nullopt;
 }
 
 }   // namespace
@@ -118,8 +111,8 @@ Eigen::Matrix3Xd initialNodes(const RodConfig& rod, const Eigen::Matrix3Xd& rest
   Eigen::Matrix3Xd points = curvePoints(*rod.initial, gravity, asked);
   if (rod.closed)
     points = endsMeet(points) ? dropLast(points) : curvePoints(*rod.initial, gravity, asked - 1);
-  const bool as_given =
-      points.cols() == rest.cols() && (isSampled(*rod.initial) ? !sampledEdges(*rod.initial) : uniform);
+  const bool as_given = points.cols() == rest.cols() &&
+                        (std::holds_alternative<PolylineCurve>(*rod.initial) ? !sampledEdges(*rod.initial) : uniform);
   return as_given ? points : resampleCurve(points, rod.closed, lengthFractions(lengths));
 }
 

@@ -62,7 +62,7 @@ void warnOfWind(const YamlCursor& wind, const SceneConfig& scene)
   const bool blows = scene.wind != Eigen::Vector3d::Zero() || scene.wind_topic;
   const bool felt = any(scene.rods, [](const RodConfig& rod) { return rod.damping.drag > 0; }) ||
                     any(scene.cloths, [](const ClothConfig& cloth) {
-                      return cloth.drag > 0 || cloth.aerodynamics.drag > 0 || cloth.aerodynamics.lift > 0;
+                      return cloth.wind_coefficient > 0 || cloth.aerodynamics.drag > 0 || cloth.aerodynamics.lift > 0;
                     });
   // of threads it is said elsewhere
   warnIf(blows && !felt && scene.threads.empty(), wind,

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <stdexcept>
 
 #include "read_parts.h"
 #include "slender_sim/rod/rigid_body.h"
@@ -78,16 +77,7 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
   if (!good)
     return;
   assign(body.inertia, inertia);
-  (at_inertia.present() ? at_inertia
-   : mass.present()     ? mass
-                        : density)
-      .attempt([&] {
-        RigidBodyModel model;
-        model.name = body.name;
-        model.mass = body.mass;
-        model.inertia = body.inertia;
-        checkBody(model);
-      });
+  (at_inertia.present() ? at_inertia : mass.present() ? mass : density).attempt([&] { checkBody(body); });
 }
 
 std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods)
@@ -141,12 +131,8 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
       map.get("shape", "Shape of the body: give one. Without the key the body has no shape, and touches nothing.");
   std::optional<Pose> pose = readPose(at_pose);
   body.shape = readShape(at_shape, context, pose);
-  if (const auto* table = body.motion ? std::get_if<TableMotion>(&*body.motion) : nullptr)
-  {
-    if (pose)
-      (at_pose.present() ? at_pose : at).problem("there is a table of poses as well; the body starts at its first");
-    pose = table->poses.evaluate(table->poses.firstTime());
-  }
+  if (body.motion)
+    startAtTable(*body.motion, at_pose.present() ? at_pose : at, "body", pose);
   assign(body.pose, pose);
   readMass(map, at_shape.present(), body);
   YamlMap velocity(map.get("velocity", "Velocity of a simulated body at the start. Without the key: at rest."));

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <stdexcept>
 
 #include "generators.h"
 #include "read_cloth_mesh.h"
@@ -374,7 +373,7 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   damping.get("stiffness", cloth.stiffness_damping, Range::closed(0, 1e3, "s"),
               "Damping of deformation (Rayleigh): it acts like the stiffness times this time, on the rate of the "
               "strain. Without the key: 0.");
-  damping.get("drag", cloth.drag, Range::closed(0, 1e6, "N s/m^3"),
+  damping.get("drag", cloth.wind_coefficient, Range::closed(0, 1e6, "N s/m^3"),
               "Pressure per velocity of the air against the cloth, along the normal. Without the key: 0.");
   damping.finish();
   YamlMap solver(map.get("solver", "Settings of the implicit solver of the cloth.").sharesKeysOf("cloths.N.solver"));

@@ -1,7 +1,6 @@
 #include "read_cloth_mesh.h"
 
 #include <cmath>
-#include <stdexcept>
 
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/geometry/mesh_file.h"

@@ -139,17 +139,16 @@ VeeCurve readVee(YamlMap& map)
   return curve;
 }
 
-FileCurve readFile(YamlMap& map, const ReadContext& context)
+PolylineCurve readFile(YamlMap& map, const ReadContext& context)
 {
-  FileCurve curve;
+  PolylineCurve curve;
   const YamlCursor path =
       map.require("path", "CSV file with a point x,y,z per line. The points are the nodes, unless `edges` is given.");
   curve.edges = readEdges(map, "Number of edges of equal length. Without the key the points are the nodes.");
   if (const auto text = path.text())
   {
-    curve.path = context.resolve(*text);
     path.attempt([&] {
-      curve.points = readPointFile(curve.path);
+      curve.points = readPointFile(context.resolve(*text));
       if (curve.points.size() < 2 || curve.points.size() > max_edges + 1u)
       {
         throw std::runtime_error("holds " + std::to_string(curve.points.size()) + " points; must hold 2 to " +
@@ -164,7 +163,7 @@ FileCurve readFile(YamlMap& map, const ReadContext& context)
 template <class CurveKind>
 double edgesOf(const CurveKind& curve)
 {
-  if constexpr (std::is_same_v<CurveKind, PolylineCurve> || std::is_same_v<CurveKind, FileCurve>)
+  if constexpr (std::is_same_v<CurveKind, PolylineCurve>)
     return std::max(curve.edges.value_or(0), static_cast<int>(curve.points.size()));
   else
     return curve.edges;

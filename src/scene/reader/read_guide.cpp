@@ -1,7 +1,6 @@
 // The guide of a tracked cloth: its mesh and how it moves.
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <stdexcept>
 
 #include "read_tracking.h"

@@ -1,5 +1,4 @@
 // Guides that a bag holds: what is in it is read by a program that knows ROS.
-#include <stdexcept>
 
 #include "read_tracking.h"
 

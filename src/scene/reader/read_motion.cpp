@@ -1,4 +1,3 @@
-#include <stdexcept>
 
 #include "read_parts.h"
 #include "slender_sim/scene/pose_file.h"

@@ -122,6 +122,8 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
 /// Reads the name of a frame of tf and removes a leading slash. Returns nothing if a problem was reported.
 std::optional<std::string> readFrameName(const YamlCursor& at);
 std::optional<Pose> readPose(const YamlCursor& at);
+/// Sets the pose at the start to the first pose of a table. Reports at `at` if there is a pose already.
+void startAtTable(const GivenMotion& motion, const YamlCursor& at, const std::string& what, std::optional<Pose>& pose);
 /// `pose` may be replaced by the shape (a plane by point and normal).
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose);
 /// What a rod, a thread or a cloth touches. `others`: the key for contact with objects of the same kind. Cloth has the

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "read_parts.h"
 #include "slender_sim/contact/solids.h"
@@ -126,6 +125,16 @@ std::optional<Pose> readPose(const YamlCursor& at)
     pose.orientation = fromRpy(*angles);
   }
   return pose;
+}
+
+void startAtTable(const GivenMotion& motion, const YamlCursor& at, const std::string& what, std::optional<Pose>& pose)
+{
+  const auto* table = std::get_if<TableMotion>(&motion);
+  if (!table)
+    return;
+  if (pose)
+    at.problem("there is a table of poses as well; the " + what + " starts at its first");
+  pose = table->poses.evaluate(table->poses.firstTime());
 }
 
 std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context, std::optional<Pose>& pose)
@@ -257,15 +266,10 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
 
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context)
 {
-  std::vector<ObstacleConfig> obstacles;
-  if (!at.present())
-    return obstacles;
-  const auto entries = at.items(0, 100'000);
-  for (std::size_t k = 0; k < entries.size(); ++k)
-  {
+  return readEach<ObstacleConfig>(at, 0, 100'000, "obstacle", [&](const YamlCursor& entry, const std::string& name) {
     ObstacleConfig obstacle;
-    YamlMap map(entries[k]);
-    obstacle.name = entries.size() == 1 ? "obstacle" : "obstacle" + std::to_string(k);
+    YamlMap map(entry);
+    obstacle.name = name;
     map.getName(obstacle.name,
                 "Name of the obstacle; bodies and obstacles need different names. Without the key: obstacle if there "
                 "is one obstacle, otherwise obstacle0, obstacle1, ...");
@@ -279,20 +283,11 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
             "key: that of the other object.");
     assign(obstacle.motion,
            readSolidMotion(map.get("motion", "How the obstacle moves. Without the key: it stands."), context, false));
-    if (const auto* table = std::get_if<TableMotion>(&obstacle.motion))
-    {
-      if (pose)
-      {
-        (at_pose.present() ? at_pose : map.at())
-            .problem("there is a table of poses as well; the obstacle starts at its first");
-      }
-      pose = table->poses.evaluate(table->poses.firstTime());
-    }
+    startAtTable(obstacle.motion, at_pose.present() ? at_pose : map.at(), "obstacle", pose);
     assign(obstacle.pose, pose);
     map.finish();
-    obstacles.push_back(std::move(obstacle));
-  }
-  return obstacles;
+    return obstacle;
+  });
 }
 
 }   // namespace slender

@@ -1,6 +1,4 @@
-#include <algorithm>
 #include <map>
-#include <stdexcept>
 
 #include "generators.h"
 #include "read_parts.h"

@@ -7,7 +7,6 @@
 #include "read_tracking.h"
 #include "slender_sim/geometry/curves.h"
 #include "slender_sim/scene/pose_file.h"
-#include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/shapes.h"
 #include "slender_sim/tracking/curve_functions.h"
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/tracking/clustering.h"

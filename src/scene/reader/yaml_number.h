@@ -2,21 +2,14 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <optional>
 #include <string>
 #include <system_error>
 
-namespace slender {
+#include "slender_sim/dynamics/failure_place.h"
 
-/// "1.5e-3" rather than "0.001500", with so many significant digits at most.
-inline std::string shortNumber(double value, int digits = 10)
-{
-  char buffer[40];
-  std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
-  return buffer;
-}
+namespace slender {
 
 /// The whole text as a decimal number (1, -2.5, 1e6, +3, also YAML's .inf and .nan), whatever the locale; nothing if it
 /// is not one. Too large to represent gives infinity.

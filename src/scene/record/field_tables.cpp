@@ -61,9 +61,7 @@ bool asks(const std::vector<RecordField>& fields, RecordField field)
 
 const std::vector<std::string> contact_columns = {"contact_fx [N]", "contact_fy [N]", "contact_fz [N]"};
 
-/// `contact`: forces on the nodes, of no columns when they are not asked for.
-void addRod(const Simulation& simulation, int rod, const std::vector<RecordField>& fields,
-            const Eigen::Matrix3Xd& contact, std::vector<FieldTable>& out)
+void addRod(const Simulation& simulation, int rod, const std::vector<RecordField>& fields, std::vector<FieldTable>& out)
 {
   const RodModel& model = simulation.rodModel(rod);
   Columns columns("rod_fields", model.name, model.nodes());
@@ -87,8 +85,8 @@ void addRod(const Simulation& simulation, int rod, const std::vector<RecordField
     columns.add({"moment_t [N m]", "moment_d1 [N m]", "moment_d2 [N m]"}, sections.material_moment);
     columns.add({"mx [N m]", "my [N m]", "mz [N m]"}, sections.moment);
   }
-  if (contact.cols() > 0)
-    columns.add(contact_columns, contact);
+  if (asks(fields, RecordField::contact_force))
+    columns.add(contact_columns, simulation.world().rodContactForces(rod));
   columns.moveTo(out);
 }
 
@@ -111,7 +109,7 @@ void addSolids(const Simulation& simulation, std::vector<FieldTable>& out)
 {
   const SceneConfig& scene = simulation.config();
   const SceneState& state = simulation.state();
-  const SolidLoads loads = simulation.world().solidLoads();
+  const ContactLoads loads = simulation.world().contactLoads();
   const bool known = std::none_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
     return cloth.contact && cloth.contact->solids && cloth.contact->method == ContactMethod::impulses;
   });
@@ -230,13 +228,8 @@ std::vector<FieldTable> fieldTablesOf(const Simulation& simulation)
   const std::vector<RecordField>& fields = simulation.config().record.fields;
   if (fields.empty())
     return out;
-  std::vector<Eigen::Matrix3Xd> contact(simulation.state().rods.size());
-  for (std::size_t r = 0; r < contact.size(); ++r)
-  {
-    if (asks(fields, RecordField::contact_force))
-      contact[r] = simulation.world().rodContactForces(static_cast<int>(r));
-    addRod(simulation, static_cast<int>(r), fields, contact[r], out);
-  }
+  for (std::size_t r = 0; r < simulation.state().rods.size(); ++r)
+    addRod(simulation, static_cast<int>(r), fields, out);
   for (std::size_t k = 0; k < simulation.state().threads.size(); ++k)
     addThread(simulation, static_cast<int>(k), fields, out);
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)

@@ -46,15 +46,8 @@ void checkPlate(const ClothModel& model, std::vector<std::string>& warnings)
 ClothModel modelOf(const ClothConfig& config, std::vector<std::string>& warnings)
 {
   ClothModel model = buildCloth(config.name, config.mesh, config.area_density, config.membrane, config.warp);
-  model.bending = config.bending;
-  model.bending_modulus = config.bending_modulus;
-  model.bending_poissons_ratio = config.bending_poissons_ratio;
-  model.mass_damping = config.mass_damping;
-  model.stiffness_damping = config.stiffness_damping;
-  model.wind_coefficient = config.drag;
-  model.aerodynamics = config.aerodynamics;
-  model.plasticity = config.plasticity;
-  model.undeformed = config.undeformed;
+  static_cast<ClothProperties&>(model) = config;
+  model.warp = config.warp.normalized();
   chooseBending(model, warnings);
   checkPlate(model, warnings);
   for (const GraspConfig& grasp : config.grasps)

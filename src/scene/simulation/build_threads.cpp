@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "scene_parts.h"
-#include "slender_sim/geometry/rotation.h"
 #include "slender_sim/scene/shapes.h"
 
 namespace slender {

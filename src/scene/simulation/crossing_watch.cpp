@@ -1,10 +1,10 @@
 #include "slender_sim/scene/crossing_watch.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/contact/solids.h"
+#include "slender_sim/dynamics/failure_place.h"
 
 namespace slender {
 
@@ -12,12 +12,7 @@ namespace {
 
 constexpr std::uint64_t kBetweenCurves = 4;   // steps; bodies may be fast, and are looked at in each step
 
-std::string timeOf(const Simulation& simulation)
-{
-  char text[60];
-  std::snprintf(text, sizeof text, " (t = %.6g s)", simulation.state().time);
-  return text;
-}
+std::string timeOf(const Simulation& simulation) { return " (t = " + shortNumber(simulation.state().time, 6) + " s)"; }
 
 }   // namespace
 
@@ -202,13 +197,11 @@ void CrossingWatch::checkHeld(std::vector<std::string>& found)
       if (ignored || (x.col(i) - pose.position).norm() > pair.radius + pair.reach ||
           distanceToShape(shape, pose, x.col(i), x.col(i)) >= pair.reach)
         continue;
-      char place[120];
-      std::snprintf(place, sizeof place, ", %s %d at (%.4g, %.4g, %.4g) m",
-                    object.kind == Kind::cloth ? "vertex" : "node", i, x(0, i), x(1, i), x(2, i));
       held_inside_.push_back(object.name + " is held inside " +
                              (pair.body < 0 ? "obstacle '" + simulation_.config().obstacles[pair.obstacle].name
                                             : "body '" + simulation_.config().bodies[pair.body].name) +
-                             "'" + place);
+                             "', " + (object.kind == Kind::cloth ? "vertex " : "node ") + std::to_string(i) + " at " +
+                             metres(x.col(i)));
       if (!pair.told)
         found.push_back(held_inside_.back() + timeOf(simulation_) + "; held points pass through it, free ones do not");
       pair.told = true;

@@ -1,7 +1,6 @@
 #include "slender_sim/scene/grasp_overlap.h"
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "scene/reader/yaml_number.h"

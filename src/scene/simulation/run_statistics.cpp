@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <numeric>
-#include <sstream>
+
+#include "slender_sim/dynamics/failure_place.h"
 
 namespace slender {
 
@@ -49,10 +50,7 @@ std::vector<std::string> graspLines(const RunStatistics& statistics, const std::
   const std::size_t named = order.size() > kMostLines ? kMostLines - 1 : order.size();
   std::vector<std::string> lines;
   const auto add = [&lines](const std::string& who, double force, double torque) {
-    std::ostringstream line;
-    line.precision(4);
-    line << who << ": largest force " << force << " N, torque " << torque << " N m";
-    lines.push_back(line.str());
+    lines.push_back(who + ": largest force " + shortNumber(force, 4) + " N, torque " + shortNumber(torque, 4) + " N m");
   };
   double force = 0.0, torque = 0.0;   // largest values of the grasps without a line
   for (std::size_t k = 0; k < order.size(); ++k)

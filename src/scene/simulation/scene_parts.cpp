@@ -1,7 +1,5 @@
 #include "scene_parts.h"
 
-#include <algorithm>
-
 #include "ignored_contacts.h"
 
 namespace slender {
@@ -29,15 +27,7 @@ void buildBodies(const SceneConfig& scene, SceneParts& parts)
   {
     const BodyConfig& config = scene.bodies[b];
     WorldModel::Body body;
-    body.body.name = config.name;
-    body.body.simulated = !config.motion.has_value();
-    body.body.mass = config.mass;
-    body.body.inertia = config.inertia;
-    body.body.gravity = config.gravity;
-    body.body.force = config.force;
-    body.body.torque = config.torque;
-    body.body.linear_damping = config.linear_damping;
-    body.body.angular_damping = config.angular_damping;
+    body.body = {config, !config.motion.has_value()};
     if (config.contact)
       body.shape = config.shape;
     body.X_BS = config.X_BS;

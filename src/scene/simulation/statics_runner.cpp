@@ -2,7 +2,6 @@
 #include "statics_runner.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "scene/reader/yaml_number.h"
 #include "scene_parts.h"
