@@ -126,8 +126,8 @@ SLENDER_INLINE Stress tensilePart(const Stress& s)
   return {middle + split * difference, middle - split * difference, split * s.s12};
 }
 
-/// Makes of the stress at x what a linear extrapolation of the strain from other points gives: less the response to
-/// the part of the strain that is of second order in the displacement, 1/2 D^T D with its gradient D.
+/// Replaces the stress at x by that of a strain that is extrapolated linearly from other points. The difference is the
+/// response to 1/2 D^T D, the part of the strain that is of second order in the displacement with the gradient D.
 SLENDER_INLINE void extrapolate(const MembraneArrays& m, int i, const Triangle& t, const double* x, const double* from,
                                 Stress& s)
 {

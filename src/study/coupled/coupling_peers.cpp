@@ -22,7 +22,7 @@ namespace slender::study {
 namespace {
 
 constexpr double kMostSeconds = 300.0;     // CPU time after which a scene ends early [s]
-constexpr double kSpeedTolerance = 1e-3;   // at whose changes the peer ends a step, and so do we [m/s]
+constexpr double kSpeedTolerance = 1e-3;   // A step ends when velocities change by less, as in the peer [m/s].
 
 /// A scene that both programs simulate. `hang`, `ball` and `sphere` have a square sheet of cotton with sides of 1 m and
 /// E h = 100 N/m. `boxes` and `twist` are examples of the peer. `peer_solutions` are the linear equations per step
