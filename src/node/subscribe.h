@@ -7,7 +7,7 @@
 
 namespace slender {
 
-/// Subscribes callback(message) to a topic, without the delay of small packets.
+/// Subscribes to a topic. Small messages are sent at once (TCP_NODELAY). callback(message) takes each message.
 template <class Message, class Callback>
 ros::Subscriber subscribe(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue_size, Callback callback)
 {

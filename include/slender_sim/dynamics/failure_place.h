@@ -39,7 +39,7 @@ private:
   double value_ = -1.0;
 };
 
-/// "1.5e-3" rather than "0.001500", with so many significant digits at most.
+/// Returns a number as text with at most `digits` significant digits, without trailing zeros: "0.0015", "1.5e-07".
 std::string shortNumber(double value, int digits = 10);
 
 /// "(0.1, -2, 0.3) m", for messages.

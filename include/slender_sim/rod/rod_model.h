@@ -39,7 +39,7 @@ struct RodModel
   int nodes() const { return static_cast<int>(mass.size()); }
   int edges() const { return static_cast<int>(rest_length.size()); }
   double totalMass() const { return mass.sum(); }
-  /// Rest lengths of the halves of two edges that belong to a node; at an end of an open rod, of one.
+  /// Returns the rest length that belongs to a node [m]: half of each edge that meets there.
   double voronoiLength(int node) const
   {
     const int before = node > 0 ? node - 1 : (closed ? edges() - 1 : -1);
