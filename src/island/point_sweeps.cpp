@@ -28,7 +28,7 @@ void PointSweeps::setPattern(const std::vector<int>& starts, const std::vector<i
     block_starts.push_back(static_cast<int>(block_rows.size()));
   }
   matrix_ = BlockMatrix(std::move(block_starts), std::move(block_rows));
-  sweeps_ = SymmetricSweeps(matrix_, nullptr);
+  sweeps_.setPattern(matrix_, nullptr);
   for (PointVector* v : {&right_, &solution_})
     v->assign(4 * turns.size(), 0.0);
 }

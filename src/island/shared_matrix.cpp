@@ -74,8 +74,11 @@ void SharedMatrix::finish(Solver solver, const std::vector<int>& blocks, const s
   values_.assign(rows_.size(), 0.0);
   if (solver_ == Solver::conjugate_gradients)
     takeBlocks(blocks);
-  if (solver_ == Solver::sweeps)
-    sweeps_.setPattern(starts_, rows_, turns);
+  if (solver_ != Solver::sweeps)
+    return;
+  if (!sweeps_)
+    sweeps_ = std::make_unique<PointSweeps>();
+  sweeps_->setPattern(starts_, rows_, turns);
 }
 
 /// The pattern of the blocks stays when contacts between blocks come and go. Then its analysis stays, too.
@@ -127,7 +130,7 @@ bool SharedMatrix::sweep()
   if (unknowns_ == 0 || !swept_.due())
     return factorDirectly();
   direct_ = false;
-  const LinearResult result = sweeps_.solve(values_, solution_, kTolerance, kMostIterations);
+  const LinearResult result = sweeps_->solve(values_, solution_, kTolerance, kMostIterations);
   iterations_ = result.iterations;
   if (!result.definite)
     return false;
@@ -173,7 +176,7 @@ bool SharedMatrix::solve()
   }
   if (solver_ == Solver::sweeps)
   {
-    sweeps_.copySolution(solution_.data());
+    sweeps_->copySolution(solution_.data());
     return true;
   }
   constexpr double kTolerance = 1e-9;   // Newton's method then converges as with a direct solution

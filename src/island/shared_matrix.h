@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -163,7 +164,7 @@ private:
   bool cholesky_known_ = false;              ///< has the present pattern
   bool direct_ = true;                       ///< the last factorisation is that of the whole matrix
 
-  PointSweeps sweeps_;
+  std::unique_ptr<PointSweeps> sweeps_;   ///< once they are needed
   std::optional<SparseCholesky> block_cholesky_;
   std::vector<int> block_entries_;               ///< places in values_ of the entries of blocks
   std::vector<int> block_starts_, block_rows_;   ///< pattern of the blocks

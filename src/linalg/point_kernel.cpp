@@ -75,63 +75,157 @@ void multiplyBlocks(int columns, const int* starts, const int* rows, const doubl
   }
 }
 
+// ---- conjugate gradients with symmetric sweeps, in single or double precision
+
+template <class Scalar>
+struct FourOf;
+template <>
+struct FourOf<double>
+{
+  using Aligned = Quad;
+  using Anywhere = QuadU;
+};
+template <>
+struct FourOf<float>
+{
+  using Aligned = float __attribute__((vector_size(16)));
+  using Anywhere __attribute__((aligned(4), may_alias)) = Aligned;
+};
+template <class Scalar>
+using Four = typename FourOf<Scalar>::Aligned;
+
+template <class Scalar>
+inline __attribute__((always_inline)) Four<Scalar> loadFour(const Scalar* p)
+{
+  return *reinterpret_cast<const typename FourOf<Scalar>::Anywhere*>(p);
+}
+
+template <class Scalar>
+inline __attribute__((always_inline)) Four<Scalar>& four(Scalar* p)
+{
+  return *reinterpret_cast<Four<Scalar>*>(p);
+}
+template <class Scalar>
+inline __attribute__((always_inline)) const Four<Scalar>& four(const Scalar* p)
+{
+  return *reinterpret_cast<const Four<Scalar>*>(p);
+}
+
 /// Three columns, `stride` apart; the fourth lane of the product is not to be looked at where that is 3.
-inline __attribute__((always_inline)) Quad times(const double* columns, int stride, Quad x)
+template <class Scalar>
+inline __attribute__((always_inline)) Four<Scalar> times(const Scalar* columns, int stride, Four<Scalar> x)
 {
-  return loadAnywhere(columns) * x[0] + loadAnywhere(columns + stride) * x[1] +
-         loadAnywhere(columns + 2 * stride) * x[2];
+  return loadFour(columns) * x[0] + loadFour(columns + stride) * x[1] + loadFour(columns + 2 * stride) * x[2];
 }
 
-void sweepDown(const SweptMatrix& m, double* x)
+/// Products of the three columns with vectors, summed over several blocks.
+template <class Scalar>
+struct TransposedProduct
 {
-  for (int visited = 0; visited < m.points; ++visited)
+  Four<Scalar> columns[3] = {};
+  inline __attribute__((always_inline)) void add(const Scalar* block, Four<Scalar> x)
   {
-    const int j = m.order[visited];
-    Quad& own = *reinterpret_cast<Quad*>(x + 4 * j);
-    const Quad xj = own = times(m.inverse + 12 * static_cast<long>(j), 4, own);
-    for (int k = m.starts[j] + 1; k < m.starts[j + 1]; ++k)
-      *reinterpret_cast<Quad*>(x + 4 * m.rows[k]) -= times(m.blocks + 9 * static_cast<long>(k), 3, xj);
-    if (!m.right)
-      continue;
-    const Quad scaled = m.factor * xj;
-    for (int k = m.right[j]; k < m.ends[j]; ++k)
-      *reinterpret_cast<Quad*>(x + m.offsets[k]) -= m.values[k] * scaled;
+    for (int c = 0; c < 3; ++c)
+      columns[c] += loadFour(block + 3 * c) * x;
   }
+  inline __attribute__((always_inline)) Four<Scalar> sum() const
+  {
+    Four<Scalar> all = {};
+    for (int c = 0; c < 3; ++c)
+      all[c] = columns[c][0] + columns[c][1] + columns[c][2];
+    return all;
+  }
+};
+
+/// Sums of products over points; single products are summed in double precision.
+template <class Scalar>
+inline __attribute__((always_inline)) void addProducts(Four<Scalar> x, Four<Scalar> y, Quad& sums)
+{
+  sums += __builtin_convertvector(x * y, Quad);
 }
 
-void sweepUp(const SweptMatrix& m, const double* b, double* x)
+template <class Scalar>
+void sweepUp(const SweptMatrix<Scalar>& m, const Scalar* p, Scalar* t, Scalar* q)
 {
-  for (int left = m.points; left-- > 0;)
+  int k = m.starts[m.points];
+  for (int j = m.points; j-- > 0;)
   {
-    const int j = m.order[left];
-    Quad s0 = {}, s1 = {}, s2 = {}, s3 = {};
-    for (int k = m.starts[j] + 1; k < m.starts[j + 1]; ++k)
+    TransposedProduct<Scalar> below;
+    for (const int end = m.starts[j]; k > end;)
     {
-      const double* a = m.blocks + 9 * static_cast<long>(k);
-      const Quad xi = load(x + 4 * m.rows[k]);
-      s0 += loadAnywhere(a) * xi;
-      s1 += loadAnywhere(a + 3) * xi;
-      s2 += loadAnywhere(a + 6) * xi;
+      --k;
+      below.add(m.blocks + 9 * static_cast<long>(k), four(t + 4 * m.rows[k]));
     }
-    if (m.right)
-      for (int k = m.right[j]; k < m.ends[j]; ++k)
-        s3 += m.values[k] * load(x + m.offsets[k]);
-    const Quad below = Quad{s0[0] + s0[1] + s0[2], s1[0] + s1[1] + s1[2], s2[0] + s2[1] + s2[2], 0.0} + m.factor * s3;
-    *reinterpret_cast<Quad*>(x + 4 * j) = times(m.inverse + 12 * static_cast<long>(j), 4, load(b + 4 * j) - below);
+    const Four<Scalar> sum = below.sum();
+    four(q + 4 * j) = sum;
+    four(t + 4 * j) = times(m.inverse + 12 * static_cast<long>(j), 4, four(p + 4 * j) - sum);
   }
 }
 
-double multiplyDiagonal(int points, const double* diagonal, const double* x, double* y)
+template <class Scalar>
+double sweepDown(const SweptMatrix<Scalar>& m, const Scalar* p, const Scalar* t, Scalar* q)
 {
   Quad form = {};
-  for (int i = 0; i < points; ++i)
+  int k = 0;
+  for (int j = 0; j < m.points; ++j)
   {
-    const Quad xi = load(x + 4 * i), yi = times(diagonal + 12 * static_cast<long>(i), 4, xi);
-    *reinterpret_cast<Quad*>(y + 4 * i) = yi;
-    form += xi * yi;
+    Four<Scalar>& own = four(q + 4 * j);
+    const Four<Scalar> solved = times(m.inverse + 12 * static_cast<long>(j), 4, own);
+    for (const int end = m.starts[j + 1]; k < end; ++k)
+      four(q + 4 * m.rows[k]) -= times(m.blocks + 9 * static_cast<long>(k), 3, solved);
+    own = solved + four(t + 4 * j);
+    addProducts<Scalar>(own, four(p + 4 * j), form);
   }
   return form[0] + form[1] + form[2];
 }
+
+template <class Scalar>
+double advance(const SweptMatrix<Scalar>& m, double alpha, const Scalar* t, const Scalar* q, Scalar* x, Scalar* r,
+               Scalar* z)
+{
+  const Scalar length = static_cast<Scalar>(alpha);
+  Quad form = {};
+  for (long j = 0; j < m.points; ++j)
+  {
+    four(x + 4 * j) += length * four(t + 4 * j);
+    const Four<Scalar> left = four(r + 4 * j) -= length * four(q + 4 * j);
+    const Four<Scalar> product = four(z + 4 * j) = times(m.diagonal + 12 * j, 4, left);
+    addProducts<Scalar>(left, product, form);
+  }
+  return form[0] + form[1] + form[2];
+}
+
+template <class Scalar>
+void turn(int points, double beta, const Scalar* z, Scalar* p)
+{
+  const Scalar kept = static_cast<Scalar>(beta);
+  for (long j = 0; j < points; ++j)
+    four(p + 4 * j) = four(z + 4 * j) + kept * four(p + 4 * j);
+}
+
+template <class Scalar>
+void gather(const GroupBlocks<Scalar>& b, const Scalar* t, Scalar* c)
+{
+  for (int j = 0; j < b.points; ++j)
+    for (int k = b.starts[j]; k < b.starts[j + 1]; ++k)
+    {
+      TransposedProduct<Scalar> product;
+      product.add(b.blocks + 9 * static_cast<long>(k), four(t + 4 * j));
+      four(c + 4 * b.groups[k]) += product.sum();
+    }
+}
+
+template <class Scalar>
+void scatter(const GroupBlocks<Scalar>& b, const Scalar* c, Scalar* q)
+{
+  for (int j = 0; j < b.points; ++j)
+    for (int k = b.starts[j]; k < b.starts[j + 1]; ++k)
+      four(q + 4 * j) -= times(b.blocks + 9 * static_cast<long>(k), 3, four(c + 4 * b.groups[k]));
+}
+
+template <class Scalar>
+constexpr SweepKernels<Scalar> kSweeps = {sweepUp<Scalar>, sweepDown<Scalar>, advance<Scalar>,
+                                          turn<Scalar>,    gather<Scalar>,    scatter<Scalar>};
 
 /// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the
 /// triangle, then take their part from the rows below.
@@ -236,8 +330,8 @@ double dot(int points, const double* x, const double* y)
 }   // namespace
 
 extern const PointKernels kPointKernels;
-const PointKernels kPointKernels = {multiply,  multiplyBlocks, forwardSupernodal, backwardSupernodal,
-                                    sweepDown, sweepUp,        multiplyDiagonal,  dot};
+const PointKernels kPointKernels = {multiply, multiplyBlocks, forwardSupernodal, backwardSupernodal,
+                                    dot,      kSweeps<float>, kSweeps<double>};
 
 }   // namespace SLENDER_ISA
 }   // namespace slender

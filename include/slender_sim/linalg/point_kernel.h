@@ -1,5 +1,7 @@
 #pragma once
 
+#include <type_traits>
+
 #include "slender_sim/linalg/isa.h"
 
 /// Products of the sparse matrices of points. Points have 4 doubles, the last of them unused; vectors are aligned to 64
@@ -16,20 +18,45 @@ struct SupernodalFactor
   const double* values = nullptr;
 };
 
-/// A symmetric matrix D + L + L^T of points: blocks as for multiplyBlocks, and those of a matrix that acts on each
-/// coordinate alike, if any (full rows; what is right of the diagonal counts, from `right` on), times `factor`.
+/// A symmetric matrix D + L + L^T of blocks of 3 x 3, whose points are numbered in the order in which sweeps visit
+/// them. L by columns: those of point j are starts[j] .. starts[j + 1] - 1, and all their rows are larger than j.
+/// Blocks are stored by columns, nine numbers each; D and its inverse as three columns of four numbers. A point whose
+/// blocks of D and of the inverse are zero is held.
+template <class Scalar>
 struct SweptMatrix
 {
   int points = 0;
   const int *starts = nullptr, *rows = nullptr;
-  const double* blocks = nullptr;
-  const int *right = nullptr, *ends = nullptr;   ///< null: no such matrix
-  const unsigned* offsets = nullptr;             ///< four times the columns
-  const double* values = nullptr;
-  double factor = 0;
-  /// in which points are visited downwards: each after its neighbours of lower number
-  const int* order = nullptr;
-  const double* inverse = nullptr;   ///< D^-1: per point three columns of four; zero keeps a point zero
+  const Scalar *blocks = nullptr, *diagonal = nullptr, *inverse = nullptr;
+};
+
+/// Blocks of 3 x 3 between points and groups of points. Those of point i are starts[i] .. starts[i + 1] - 1.
+template <class Scalar>
+struct GroupBlocks
+{
+  int points = 0;
+  const int *starts = nullptr, *groups = nullptr;
+  const Scalar* blocks = nullptr;
+};
+
+/// What an iteration of conjugate gradients with symmetric sweeps consists of. Vectors have four numbers per point, the
+/// last of them unused.
+template <class Scalar>
+struct SweepKernels
+{
+  /// t = (D + L^T)^-1 p, q = L^T t.
+  void (*up)(const SweptMatrix<Scalar>& matrix, const Scalar* p, Scalar* t, Scalar* q);
+  /// q := t + (D + L)^-1 q. Returns p . q.
+  double (*down)(const SweptMatrix<Scalar>& matrix, const Scalar* p, const Scalar* t, Scalar* q);
+  /// x += alpha t, r -= alpha q, z = D r. Returns r . z.
+  double (*advance)(const SweptMatrix<Scalar>& matrix, double alpha, const Scalar* t, const Scalar* q, Scalar* x,
+                    Scalar* r, Scalar* z);
+  /// p := z + beta p.
+  void (*turn)(int points, double beta, const Scalar* z, Scalar* p);
+  /// c += B^T t.
+  void (*gather)(const GroupBlocks<Scalar>& b, const Scalar* t, Scalar* c);
+  /// q -= B c.
+  void (*scatter)(const GroupBlocks<Scalar>& b, const Scalar* c, Scalar* q);
 };
 
 struct PointKernels
@@ -44,13 +71,19 @@ struct PointKernels
   /// x := L^-1 x, and x := L^-T x, for each coordinate.
   void (*forwardSupernodal)(const SupernodalFactor& factor, double* x);
   void (*backwardSupernodal)(const SupernodalFactor& factor, double* x);
-  /// x := (D + L)^-1 x; x := (D + L^T)^-1 b.
-  void (*sweepDown)(const SweptMatrix& matrix, double* x);
-  void (*sweepUp)(const SweptMatrix& matrix, const double* b, double* x);
-  /// y = D x: per point three columns of four. Returns x . y.
-  double (*multiplyDiagonal)(int points, const double* diagonal, const double* x, double* y);
   /// Sum of x . y over points; the unused parts do not count.
   double (*dot)(int points, const double* x, const double* y);
+  SweepKernels<float> single_sweeps;
+  SweepKernels<double> double_sweeps;
+
+  template <class Scalar>
+  const SweepKernels<Scalar>& sweeps() const
+  {
+    if constexpr (std::is_same_v<Scalar, float>)
+      return single_sweeps;
+    else
+      return double_sweeps;
+  }
 };
 
 SLENDER_DECLARE_KERNELS(PointKernels, kPointKernels)
