@@ -2,6 +2,7 @@
 #include "slender_sim/cloth/cloth_stepper.h"
 
 #include "cloth_stepper_impl.h"
+#include "dynamics/statics_advice.h"
 
 namespace slender {
 
@@ -26,7 +27,7 @@ StepReport ClothStepper::Impl::statics(ClothState& state, const ClothInputs& inp
     statics_->assess(state, inputs, report);
   else if (const StepFailure failure = statics_->solve(state, inputs, leave_saddles, report);
            failure != StepFailure::none)
-    return refuse(report, failure, statics_->explain(failure));
+    return refuse(report, failure, explainStatics(failure, "cloth", "start of the cloth"));
   pin_forces = statics_->pinForces();
   lowest_mode = statics_->mode();
   return report;

@@ -59,11 +59,8 @@ bool ClothStages::accepts(const ClothState& state, const ClothInputs& inputs, do
 
 StepReport ClothStages::refuse(StepReport& report, StepFailure failure, const std::string& message) const
 {
-  report.ok = false;
   report.work = ownWork();
-  report.failure = failure;
-  report.message = "cloth '" + model->name + "': " + message;
-  return report;
+  return report.refuse(failure, "cloth '" + model->name + "': " + message);
 }
 
 std::string ClothStages::explain(StepFailure failure, double length) const

@@ -356,12 +356,11 @@ StepReport ClothGroup::tryStep(const ClothGroupInputs& inputs, double from, doub
   }
   if (!found.ok)
   {
-    report.ok = false;
-    report.failure = found.spent ? StepFailure::work_exceeded : StepFailure::squeezed;
-    report.message = "collisions: " + found.reason + whereIs(found) +
-                     (found.at_start ? "; start from a state in which nothing intersects"
-                                     : "; use a shorter step, or leave the cloth more room") +
-                     blameAverages(found);
+    report.refuse(found.spent ? StepFailure::work_exceeded : StepFailure::squeezed,
+                  "collisions: " + found.reason + whereIs(found) +
+                      (found.at_start ? "; start from a state in which nothing intersects"
+                                      : "; use a shorter step, or leave the cloth more room") +
+                      blameAverages(found));
     hopeless_ = found.at_start;
     for (const int point : found.points)
       if (point >= 0 && point < first_.back() && report.place.kind == FailurePlace::Kind::none)

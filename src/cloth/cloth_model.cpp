@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "slender_sim/dynamics/failure_place.h"
+#include "slender_sim/energy/hinge_term.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/geometry/mesh_defects.h"
 
@@ -49,7 +50,7 @@ namespace {
 Eigen::VectorXd restAngles(const ClothModel& model)
 {
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(model.topology.hingeCount());
-  const HingeBending hinges(model.topology.hinges, none, none);
+  const HingeTerm hinges(model.topology.hinges, none, none);
   PointVector points;
   toPoints(model.undeformed.cols() ? model.undeformed : model.rest.vertices, points);
   Eigen::VectorXd angles(hinges.paddedCount());

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kNear = 0.1;             ///< increment, over the shortest edge, below which the exact Hessian is taken
 constexpr double kShiftOfAngle = 0.2;     ///< of the weight of inertia, per unit of a shift of angles
+constexpr double kFirstShift = 1e-3;      ///< of all vertices in statics, per unit of a shift of angles
 constexpr int kTimesWork = 5;             ///< of a step in an island, over that of a cloth alone
 constexpr long kSharedFactorWork = 100;   ///< counts of a WorkBudget per vertex
 constexpr long kSharedSolutionWork = 4;   ///< likewise, of a solution with the factor
@@ -249,9 +250,10 @@ void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_poin
 
 void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  exact_ = near_ && shift.position == 0.0 && !linearized_;
+  const bool statics = statics_rate_ > 0.0;
+  exact_ = statics || (near_ && shift.position == 0.0 && !linearized_);
   const HessianKind kind = exact_ ? HessianKind::exact : HessianKind::semidefinite;
-  const PointVector* const from = linearized_ ? nullptr : moved_ ? &base_ : &base_before_;
+  const PointVector* const from = linearized_ || statics ? nullptr : moved_ ? &base_ : &base_before_;
   const ClothEvaluation e =
       with_hessian ? system().evaluateHessian(stages_.x, kind, from) : system().evaluate(stages_.x);
   largest_contact_ = 0.0;
@@ -319,7 +321,9 @@ void ClothPart::addOwnContacts(bool with_hessian)
 void ClothPart::factor(const HessianShift& shift)
 {
   const double added = inertiaShift(shift);
-  if (added > 0.0)
+  if (statics_rate_ > 0.0)
+    system().addInertia((shift.position + kFirstShift * shift.angle) * statics_rate_);
+  else if (added > 0.0)
     system().shiftMatrix(added);
   if (solvesByFactors())
     outcome_ = stages_.linear->factor() ? LinearOutcome::solved : LinearOutcome::not_definite;
@@ -353,72 +357,6 @@ void ClothPart::solve()
   near_ = incrementSize(0.0) < kNear;
 }
 
-// ---- the matrix of the island
-
-void ClothPart::notePattern(SharedMatrix& matrix)
-{
-  const auto note = [&](int i, int j, bool whole) {
-    for (int c = 0; c < 3; ++c)
-      for (int r = whole ? 0 : c; r < (whole ? 3 : c + 1); ++r)
-        matrix.note(base(i) + r, base(j) + c);
-  };
-  const BlockMatrix& blocks = system().matrix();
-  for (int j = 0; j < points(); ++j)
-    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
-      if (isFree(j) && isFree(blocks.rows()[k]))
-        note(blocks.rows()[k], j, true);
-  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
-  for (int i = 0; constant && i < points(); ++i)
-    for (int k = constant->starts()[i]; k < constant->starts()[i + 1] && constant->column(k) <= i; ++k)
-      if (isFree(i) && isFree(constant->column(k)))
-        note(i, constant->column(k), false);
-}
-
-void ClothPart::findEntries(const SharedMatrix& matrix)
-{
-  const BlockMatrix& blocks = system().matrix();
-  block_entries_.assign(3 * static_cast<std::size_t>(blocks.blocks()), -1);
-  for (int j = 0; j < points(); ++j)
-    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
-      if (const int i = blocks.rows()[k]; isFree(i) && isFree(j))
-        for (int c = 0; c < 3; ++c)
-          block_entries_[3 * k + c] = matrix.index(base(i) + (i == j ? c : 0), base(j) + c);
-  constant_entries_.clear();
-  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
-  for (int i = 0; constant && i < points(); ++i)
-    for (int k = constant->starts()[i]; k < constant->starts()[i + 1] && constant->column(k) <= i; ++k)
-      for (int c = 0, j = constant->column(k); c < 3; ++c)
-        constant_entries_.push_back(isFree(i) && isFree(j) ? matrix.index(base(i) + c, base(j) + c) : -1);
-}
-
-/// Rows of a point follow each other in the matrix, so that those of a block's column do.
-void ClothPart::addHessian(SharedMatrix& matrix, const HessianShift& shift)
-{
-  const BlockMatrix& blocks = system().matrix();
-  double* const values = matrix.values();
-  const double added = inertiaShift(shift);
-  for (int j = 0; j < points(); ++j)
-    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
-    {
-      const bool diagonal = blocks.rows()[k] == j;
-      const double* block = blocks.values() + 9 * static_cast<std::size_t>(k);
-      for (int c = 0; c < 3 && block_entries_[3 * k + c] >= 0; ++c)
-      {
-        double* const to = values + block_entries_[3 * k + c] - (diagonal ? c : 0);
-        for (int r = diagonal ? c : 0; r < 3; ++r)
-          to[r] += block[3 * c + r] + (diagonal && r == c ? added * system().weights()[j] : 0.0);
-      }
-    }
-  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
-  const double factor = 1.0 + system().viscosity();
-  const int* entry = constant_entries_.data();
-  for (int i = 0; constant && i < points(); ++i)
-    for (int k = constant->starts()[i]; k < constant->starts()[i + 1] && constant->column(k) <= i; ++k)
-      for (int c = 0; c < 3; ++c, ++entry)
-        if (*entry >= 0)
-          values[*entry] += factor * constant->values()[k];
-}
-
 void ClothPart::takeGradient(double* right) const
 {
   for (int i = 0; i < points(); ++i)
@@ -438,17 +376,11 @@ void ClothPart::takeDirection(const double* solution)
     stages_.spend(points() * (kSharedFactorWork + 3 * averages_->count() * kSharedSolutionWork));
 }
 
-void ClothPart::addColumns(int point, int component, double weight, Columns& row) const
-{
-  if (isFree(point))
-    row.push(base(point) + component, weight);
-}
-
 // ---- measures
 
 double ClothPart::stepLimit() const
 {
-  if (!contact_)   // the energy alone bears turns of any size
+  if (!contact_ && !(statics_rate_ > 0.0))   // with inertia the energy alone bears turns of any size
     return 1.0;
   const auto& edges = stages_.model->topology.edges;
   double turn = 0.0;

@@ -45,6 +45,8 @@ public:
   void setContact(const ContactProperties& contact, double step, const std::vector<IgnoredSolid>& ignored = {});
   /// These vertices are driven corners of the surface from now on. begin() takes them from the state.
   void setPins(const std::vector<int>& pins);
+  /// For statics. The Hessian is always the exact one, and a shift adds so much inertia [1/s^2] per unit.
+  void minimiseWithoutInertia(double rate) { statics_rate_ = rate; }
   int points() const override { return stages_.model->vertices(); }
   void addSurface(ContactSurface& surface) const override;
 
@@ -129,6 +131,7 @@ private:
       nullptr;                ///< the set of the present step; null: the stages have it, or there is none
   bool dependent_ = false;    ///< the averages depend on each other on the free vertices
   bool linearized_ = false;   ///< steps are one step of Newton's method
+  double statics_rate_ = 0;   ///< see minimiseWithoutInertia(); 0: steps
   std::optional<ContactProperties> contact_;
   std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
   double contact_step_ = 0.0;                                  ///< [s]

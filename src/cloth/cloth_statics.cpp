@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/statics_advice.h"
 #include "slender_sim/dynamics/lowest_eigenvalue.h"
 
 namespace slender {
@@ -14,15 +15,11 @@ namespace {
 /// Without inertia: the square of this is still a finite number.
 constexpr double kNoInertia = 1e150;
 
-/// Share of the lowest bending stiffness (D over mass and size squared) below which an eigenvalue counts as zero, as in
-/// statics of rods.
-constexpr double kNeutralShare = 1e-6;
-
-ClothModel elasticPart(const ClothModel& model)
+std::shared_ptr<const ClothModel> elasticPart(const ClothModel& model)
 {
-  ClothModel elastic = model;
-  elastic.mass_damping = elastic.stiffness_damping = elastic.wind_coefficient = 0.0;
-  elastic.aerodynamics = Aerodynamics{};
+  auto elastic = std::make_shared<ClothModel>(model);
+  elastic->mass_damping = elastic->stiffness_damping = elastic->wind_coefficient = 0.0;
+  elastic->aerodynamics = Aerodynamics{};
   return elastic;
 }
 
@@ -35,31 +32,18 @@ ClothOptions directOptions()
 
 }   // namespace
 
-bool ClothTrial::Definiteness::positiveDefinite()
-{
-  ClothStatics& s = *statics;
-  if (!s.factored_)
-  {
-    s.definite_ = s.linear_.factor();
-    s.factored_ = true;
-    ++s.factorizations_;
-  }
-  return s.definite_;
-}
-
 ClothStatics::ClothStatics(const ClothModel& model, const NewtonConfig& newton)
-  : model_(elasticPart(model)),
-    system_(model_, true),
-    linear_(model_, directOptions(), system_),
+  : stages_(elasticPart(model), directOptions()),
+    part_(stages_),
+    equations_(false),
+    model_(*stages_.model),
+    system_(*stages_.system),
+    linear_(*stages_.linear),
     newton_(newton)
 {
-  shortest_edge_ = std::numeric_limits<double>::infinity();
-  for (Eigen::Index e = 0; e < model_.topology.edges.cols(); ++e)
-    shortest_edge_ = std::min(shortest_edge_, (model_.rest.vertices.col(model_.topology.edges(0, e)) -
-                                               model_.rest.vertices.col(model_.topology.edges(1, e)))
-                                                  .norm());
+  equations_.setParts({&part_});
   size_ = (model_.rest.vertices.rowwise().maxCoeff() - model_.rest.vertices.rowwise().minCoeff()).norm();
-  for (PointVector* v : {&x_, &trial_, &base_, &saved_, &d_, &force_})
+  for (PointVector* v : {&x_, &d_, &force_})
     v->assign(4 * static_cast<std::size_t>(model_.vertices()), 0.0);
   newton_.tolerance = std::min(newton_.tolerance, 1e-8);
   newton_.max_iterations = std::max(60, newton_.max_iterations);
@@ -70,6 +54,7 @@ void ClothStatics::begin(const ClothState& state, const ClothInputs& inputs)
   state_ = state;
   inputs_ = inputs;
   inputs_.wind.setZero();
+  stages_.begin(state_, inputs_, 1.0);
   toPoints(state.x, x_);
   system_.hold(state_);
   double load = 0.0;
@@ -88,6 +73,7 @@ void ClothStatics::begin(const ClothState& state, const ClothInputs& inputs)
   const double stiffness = std::max(model_.bending_modulus / (size_ * size_), load / size_);
   unit_rate_ =
       100.0 * (stiffness > 0 ? stiffness : 1e-6 * (model_.membrane.c11 + model_.membrane.c22)) / model_.totalMass();
+  part_.minimiseWithoutInertia(unit_rate_);
   factorizations_ = 0;
 }
 
@@ -96,55 +82,6 @@ void ClothStatics::setRound(double weight)
 {
   const ClothStage stage{weight > 0 ? 1.0 / std::sqrt(weight) : kNoInertia, &x_, &x_, &x_, &x_, &state_.v};
   system_.beginStage(stage, inputs_);
-}
-
-ClothTrial ClothStatics::evaluate(bool with_hessian, const HessianShift& shift)
-{
-  const ClothEvaluation e =
-      with_hessian ? system_.evaluateHessian(trial_, HessianKind::exact) : system_.evaluate(trial_);
-  // Cloth has no massless unknowns: the shifts that minimize() tries on them first are small ones of all vertices here.
-  constexpr double kFirstShift = 1e-3;
-  if (with_hessian && !shift.none())
-    system_.addInertia((shift.position + kFirstShift * shift.angle) * unit_rate_);
-  if (with_hessian)
-    factored_ = false;
-  ClothTrial trial;
-  trial.stretch = e.membrane;
-  trial.bend_twist = e.bending;
-  trial.potential = e.potential;
-  trial.max_strain = e.max_strain;
-  trial.inertia.statics = this;
-  return trial;
-}
-
-void ClothStatics::solve()
-{
-  for (int i = 0; i < model_.vertices(); ++i)
-    point(d_, i) = system_.held()[i] ? Eigen::Vector3d::Zero() : Eigen::Vector3d(-point(system_.gradient(), i));
-  linear_.solveFactored(d_);
-}
-
-void ClothStatics::moveAlong(double alpha)
-{
-  for (std::size_t i = 0; i < trial_.size(); ++i)
-    trial_[i] = base_[i] + alpha * d_[i];
-}
-
-double ClothStatics::incrementSize() const
-{
-  double square = 0.0;
-  for (int i = 0; i < model_.vertices(); ++i)
-    square = std::max(square, point(d_, i).squaredNorm());
-  return std::sqrt(square) / shortest_edge_;
-}
-
-double ClothStatics::slope() const
-{
-  const PointVector& gradient = system_.gradient();
-  double sum = 0.0;
-  for (int i = 0; i < model_.vertices(); ++i)
-    sum += point(gradient, i).dot(point(d_, i));
-  return sum;
 }
 
 /// Largest turn or stretch of an edge by a displacement, over its length at rest.
@@ -158,13 +95,6 @@ double ClothStatics::turnOf(const PointVector& d) const
         worst, (point(d, b) - point(d, a)).norm() / (model_.rest.vertices.col(b) - model_.rest.vertices.col(a)).norm());
   }
   return worst;
-}
-
-double ClothStatics::stepLimit() const
-{
-  constexpr double kMostTurn = 0.7;   // [rad] as for edges of rods
-  const double turn = turnOf(d_);
-  return turn > kMostTurn ? kMostTurn / turn : 1.0;
 }
 
 double ClothStatics::residual() const
@@ -181,33 +111,27 @@ double ClothStatics::residual() const
 double ClothStatics::forceScale() const
 {
   const PointVector& gradient = system_.gradient();
-  double largest = 1e-9 * (model_.membrane.c11 + model_.membrane.c22) * shortest_edge_;
+  double largest = 1e-9 * (model_.membrane.c11 + model_.membrane.c22) * stages_.shortestEdge();
   for (int i = 0; i < model_.vertices(); ++i)
     largest = std::max({largest, point(force_, i).norm(), system_.held()[i] ? point(gradient, i).norm() : 0.0});
   return largest;
 }
 
-/// Strains of eps extent / edge times the modulus and the edge.
-double ClothStatics::noiseLevel() const
-{
-  double extent = 0.0;
-  for (const double x : trial_)
-    extent = std::max(extent, std::abs(x));
-  return 4.0 * std::numeric_limits<double>::epsilon() * (model_.membrane.c11 + model_.membrane.c22) * extent;
-}
-
 NewtonResult ClothStatics::round(double fraction, double weight)
 {
   setRound(weight * unit_rate_);
-  trial_ = x_;
+  PointVector& trial = stages_.x;
+  trial = x_;
   for (std::size_t k = 0; k < state_.pins.size(); ++k)
   {
     const Eigen::Index pin = static_cast<Eigen::Index>(k);
-    point(trial_, state_.pins[k]) = pins_from_.col(pin) + fraction * (inputs_.pins.col(pin) - pins_from_.col(pin));
+    point(trial, state_.pins[k]) = pins_from_.col(pin) + fraction * (inputs_.pins.col(pin) - pins_from_.col(pin));
   }
-  const NewtonResult result = minimize(*this, newton_);
+  equations_.beginSubstep(0.0);
+  const NewtonResult result = equations_.solve(fraction, fraction, newton_);
+  factorizations_ += result.factorizations;
   if (result.ok())
-    std::swap(x_, trial_);   // trial_ is where the round began
+    std::swap(x_, trial);   // the trial is where the round began
   return result;
 }
 
@@ -215,20 +139,27 @@ double ClothStatics::shift() const
 {
   double square = 0.0;
   for (int i = 0; i < model_.vertices(); ++i)
-    square = std::max(square, (point(x_, i) - point(trial_, i)).squaredNorm());
+    square = std::max(square, (point(x_, i) - point(stages_.x, i)).squaredNorm());
   return std::sqrt(square) / size_;
+}
+
+void ClothStatics::takeBase()
+{
+  static_cast<Part&>(part_).moveAlong(0.0);
+  x_ = stages_.x;
 }
 
 /// Returns the number of moves in which the pins can be carried to their targets: each at most a fifth of an edge. 0:
 /// all are there.
 double ClothStatics::pinMoves() const
 {
-  return state_.pins.empty() ? 0.0 : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * shortest_edge_);
+  return state_.pins.empty() ? 0.0
+                             : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * stages_.shortestEdge());
 }
 
 bool ClothStatics::definite(double rate)
 {
-  system_.evaluateHessian(trial_, HessianKind::exact);
+  system_.evaluateHessian(x_, HessianKind::exact);
   system_.addInertia(rate);
   ++factorizations_;
   return linear_.factor();
@@ -252,8 +183,7 @@ void ClothStatics::findMode()
   const int n = model_.vertices();
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k)
-      // no symmetry that a mode could be orthogonal to
-      point(d_, i)[k] = std::sin(1.0 + 1.7 * (3 * i + k)) + 0.5 * std::cos(0.3 * (3 * i + k));
+      point(d_, i)[k] = startOfMode(3 * i + k);
   for (int round = 0; round < 12; ++round)
   {
     double square = 0.0;
@@ -288,8 +218,7 @@ EquilibriumStability ClothStatics::assess(bool spectrum)
 {
   EquilibriumStability result;
   setRound(0.0);
-  trial_ = x_;
-  const ClothEvaluation e = system_.evaluate(trial_);
+  const ClothEvaluation e = system_.evaluate(x_);
   // Within a round the loads' energy counts from x_. Here it counts from the origin, so that states can be compared.
   double potential = 0.0, size = 0.0;
   for (int i = 0; i < model_.vertices(); ++i)
@@ -324,8 +253,7 @@ bool ClothStatics::displace(double turn)
 void ClothStatics::finish(StepReport& report)
 {
   setRound(0.0);
-  trial_ = x_;
-  const ClothEvaluation e = system_.evaluate(trial_);
+  const ClothEvaluation e = system_.evaluate(x_);
   report.residual = residual() / forceScale();
   report.max_strain = std::max(report.max_strain, e.max_strain);
   report.factorizations += factorizations_;
@@ -369,29 +297,6 @@ void ClothStatics::assess(const ClothState& state, const ClothInputs& inputs, St
   report.lowest_eigenvalue = at.lowest;
   report.energy = at.energy;
   finish(report);
-}
-
-std::string ClothStatics::explain(StepFailure failure) const
-{
-  const std::string what = "no equilibrium was found: ";
-  switch (failure)
-  {
-    case StepFailure::singular_matrix:
-      return what +
-             "the stiffness matrix could not be made definite: moduli or masses differ by too many orders of "
-             "magnitude, or something is free to "
-             "drift: hold it by a grasp";
-    case StepFailure::state_not_finite:
-      return what +
-             "the configuration overflowed: the loads are too large for the cloth, or something is free to drift: hold "
-             "it by a grasp";
-    case StepFailure::interrupted: return what + "the search was interrupted on request";
-    default:
-      return what +
-             "Newton's method did not converge: hold what drifts by a grasp, start from a shape that is nearer to the "
-             "equilibrium (start of the cloth), "
-             "or let the cloth settle by time stepping with damping (start: as_given)";
-  }
 }
 
 }   // namespace slender

@@ -30,21 +30,35 @@ Island& ClothStepper::Impl::island()
   return *island;
 }
 
-StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs, double duration)
+bool ClothStepper::Impl::load(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report)
 {
-  StepReport report;
   if (own_budget_)   // error control takes as many substeps as accuracy asks for
     budget_->start(options.error_tolerance > 0 ? WorkBudget::kUnbounded : WorkBudget::ofStep(model->vertices()));
   if (!accepts(state, inputs, duration, report))
-    return report;
-  double next = state.next_step;
+    return false;
   part_.begin(state, inputs, duration);
-  report = island().step(duration, next);
+  return true;
+}
+
+StepReport ClothStepper::Impl::advance()
+{
+  double next = work_.next_step;
+  StepReport report = island().step(duration_, next);
   if (!report.ok)
     return report;
   report.work = ownWork();
   work_.next_step = next;
-  end(state);
+  return report;
+}
+
+StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs, double duration)
+{
+  StepReport report;
+  if (!load(state, inputs, duration, report))
+    return report;
+  report = advance();
+  if (report.ok)
+    end(state);
   return report;
 }
 

@@ -13,10 +13,15 @@ class ClothStepper::Impl : public ClothStages
 public:
   Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);
 
+  /// A step is load(), advance(), end(). load() returns false if it cannot begin; the report then says why.
+  bool load(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report);
+  StepReport advance();
   StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   StepReport statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles);
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement,
                Eigen::Matrix3Xd& pin_forces_change, Eigen::Matrix3Xd& average_forces_change);
+
+  ClothPart& part() { return part_; }
 
   Eigen::Matrix3Xd lowest_mode;
   bool undivided = false;   ///< the present step is one of stepUndivided() that differs from those of the options

@@ -21,7 +21,7 @@ PlasticFlow::PlasticFlow(const ClothModel& model) : law_(model.plasticity)
     refuse(std::string("is for hinge bending, not ") + toString(model.bending) + ", which has no rest angles");
   const MeshTopology& t = model.topology;
   const Eigen::VectorXd areas = faceAreas(model.rest), none = Eigen::VectorXd::Zero(t.hingeCount());
-  hinges_ = std::make_unique<HingeBending>(t.hinges, none, none);
+  hinges_ = std::make_unique<HingeTerm>(t.hinges, none, none);
   width_.resize(t.hingeCount());
   for (int h = 0; h < t.hingeCount(); ++h)
   {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 #include <tuple>
 
 #include <Eigen/Geometry>
@@ -244,15 +245,14 @@ bool AllPieces::mayTouch(int a, int b) const
 /// A shape that is no mesh.
 ConvexPiece convexPiece(const Shape& shape)
 {
-  if (const auto* p = std::get_if<Plane>(&shape))
-    return *p;
-  if (const auto* s = std::get_if<Sphere>(&shape))
-    return *s;
-  if (const auto* b = std::get_if<Box>(&shape))
-    return *b;
-  if (const auto* y = std::get_if<Cylinder>(&shape))
-    return *y;
-  return std::get<Capsule>(shape);
+  return std::visit(
+      [](const auto& s) -> ConvexPiece {
+        if constexpr (std::is_constructible_v<ConvexPiece, decltype(s)>)
+          return s;
+        else
+          throw std::logic_error("a mesh is not convex");
+      },
+      shape);
 }
 
 /// Whether what sticks out of a solid meets the inside of a face, whose corners are in the frame of the solid.

@@ -154,12 +154,12 @@ double boundingRadius(const Shape& shape)
 
 double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector3d& from, const Eigen::Vector3d& to)
 {
-  constexpr int kPlaces = 16;
+  const int places = from == to ? 0 : 16;
   const Eigen::Vector3d a = pose.inverse() * from, e = pose.inverse() * to - a;
   double least = std::numeric_limits<double>::infinity();
   const auto look = [&](const ConvexPiece& piece) {
-    for (int k = 0; k <= kPlaces; ++k)
-      least = std::min(least, pieceDistance(piece, a + e * k / kPlaces, e).distance);
+    for (int k = 0; k <= places; ++k)
+      least = std::min(least, pieceDistance(piece, a + e * k / 16, e).distance);
   };
   std::visit(
       [&](const auto& s) {

@@ -350,13 +350,9 @@ bool Island::mend(StepReport& report)
 void Island::refuse(const Substep& substep, StepFailure failure, StepReport& report)
 {
   if (failure == StepFailure::interrupted)
-  {
-    report.ok = false;
-    report.failure = failure;
-    report.message = kStepInterrupted;
-    return;
-  }
-  parts_[std::min(failed_, parts_.size() - 1)]->refuse(failure, substep.length, report);
+    report.refuse(failure, kStepInterrupted);
+  else
+    parts_[std::min(failed_, parts_.size() - 1)]->refuse(failure, substep.length, report);
 }
 
 }   // namespace slender

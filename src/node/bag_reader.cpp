@@ -21,41 +21,11 @@
 #include "slender_sim/node/step_gaps.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
+#include "message_snapshots.h"
 #include "topic_stream.h"
 
 namespace slender {
 namespace {
-
-Eigen::VectorXd numbers(const std::vector<double>& from)
-{
-  return Eigen::Map<const Eigen::VectorXd>(from.data(), static_cast<Eigen::Index>(from.size()));
-}
-
-std::vector<Eigen::Quaterniond> quaternions(const std::vector<geometry_msgs::Quaternion>& from)
-{
-  std::vector<Eigen::Quaterniond> out;
-  for (const geometry_msgs::Quaternion& q : from)
-    out.push_back(fromMessage(q));
-  return out;
-}
-
-bool allFinite(const std::vector<Eigen::Quaterniond>& all)
-{
-  return std::all_of(all.begin(), all.end(), [](const Eigen::Quaterniond& q) { return q.coeffs().allFinite(); });
-}
-
-void require(bool fits, const std::string& what)
-{
-  if (!fits)
-    throw BagError("a message of " + what +
-                   " has arrays that do not fit each other: the bag was not written by slender_sim, or is damaged");
-}
-
-void requireFinite(bool finite, const std::string& what)
-{
-  if (!finite)
-    throw BagError("a message of " + what + " has numbers that are not finite: the bag is damaged; copy it anew");
-}
 
 /// The shortest step [s] that explains so many nanoseconds in so many steps: stamps are rounded, scenes say 0.002.
 double shortestStep(double span_ns, double steps)
@@ -104,12 +74,14 @@ struct BagReader::Contents
   }
   GraspSnapshot& grasp(const std::string& name);
   void turnWrenches();
-  const slender_sim::MeshStamped* meshOf(const slender_sim::ClothState& cloths) const;
-  void add(const slender_sim::RodState& rod);
-  void add(const slender_sim::ThreadState& thread);
-  void add(const slender_sim::ClothState& cloths);
-  void add(const slender_sim::BodyStates& states, std::vector<SolidSnapshot>& solids);
-  void add(const slender_sim::Fields& fields);
+  /// Takes the step of a state of rods, threads or cloths.
+  template <class Message>
+  void takeStep(const Message& state)
+  {
+    step = state.step;
+    epoch = state.epoch;
+    step_known = true;
+  }
 };
 
 void BagReader::Contents::open()
@@ -217,10 +189,11 @@ void BagReader::Contents::readScene(const std::string& folder)
     {
       const slender_sim::MeshStamped& mesh = *message;
       for (std::size_t k = 0; k < mesh.names.size(); ++k)
-        require(mesh.vertex_offsets.size() == mesh.names.size() && mesh.triangle_offsets.size() == mesh.names.size() &&
-                    mesh.vertex_offsets[k] <= mesh.vertices.size() &&
-                    3 * std::size_t{mesh.triangle_offsets[k]} <= mesh.triangles.size(),
-                "mesh");
+        requireArrays(mesh.vertex_offsets.size() == mesh.names.size() &&
+                          mesh.triangle_offsets.size() == mesh.names.size() &&
+                          mesh.vertex_offsets[k] <= mesh.vertices.size() &&
+                          3 * std::size_t{mesh.triangle_offsets[k]} <= mesh.triangles.size(),
+                      "mesh");
       meshes.push_back(mesh);
     }
 }
@@ -237,22 +210,37 @@ void BagReader::Contents::openStreams()
     if (!seen.insert({topic, connection->datatype}).second)
       continue;
     const std::string type = connection->datatype.substr(connection->datatype.find('/') + 1);
-    if ((name == "state" || name == "rods/state") && type == "RodState")
-      stream<slender_sim::RodState>(topic, "RodState", [this](const auto& m) { add(m); });
-    else if ((name == "state" || name == "threads/state") && type == "ThreadState")
-      stream<slender_sim::ThreadState>(topic, "ThreadState", [this](const auto& m) { add(m); });
-    else if ((name == "state" || name == "cloths/state") && type == "ClothState")
-      stream<slender_sim::ClothState>(topic, "ClothState", [this](const auto& m) { add(m); });
+    const SceneConfig* const known = scene ? &*scene : nullptr;
+    // in scenes of several kinds each kind has its own namespace
+    const auto isState = [&](const std::string& kind, const char* its_type) {
+      return type == its_type && (name == "state" || name == kind + "/state");
+    };
+    if (isState("rods", "RodState"))
+      stream<slender_sim::RodState>(topic, "RodState", [this, known](const auto& m) {
+        takeStep(m);
+        addSnapshot(m, known, *out);
+      });
+    else if (isState("threads", "ThreadState"))
+      stream<slender_sim::ThreadState>(topic, "ThreadState", [this](const auto& m) {
+        takeStep(m);
+        addSnapshot(m, *out);
+      });
+    else if (isState("cloths", "ClothState"))
+      stream<slender_sim::ClothState>(topic, "ClothState", [this, known](const auto& m) {
+        takeStep(m);
+        addSnapshot(m, meshes, known, *out);
+      });
     else if (name == "body_states" && type == "BodyStates")
-      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->bodies); });
+      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { addSnapshot(m, out->bodies); });
     else if (name == "obstacle_states" && type == "BodyStates")
-      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { add(m, out->obstacles); });
+      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { addSnapshot(m, out->obstacles); });
     else if (name == "fields" && type == "Fields")
-      stream<slender_sim::Fields>(topic, "Fields", [this](const auto& m) { add(m); });
+      stream<slender_sim::Fields>(topic, "Fields", [this](const auto& m) { addSnapshot(m, *out); });
     else if (name == "grasp_states" && type == "GraspStates")
       stream<slender_sim::GraspStates>(topic, "GraspStates", [this](const auto& m) {
-        require(m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(),
-                "grasp_states");
+        requireArrays(
+            m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(),
+            "grasp_states");
         for (std::size_t g = 0; g < m.name.size(); ++g)
           grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, recordedPose(m.pose[g])};
       });
@@ -326,124 +314,6 @@ void BagReader::Contents::turnWrenches()
     turned.wrench = {q * turned.wrench.force, q * turned.wrench.torque};
   }
   own_axes.clear();
-}
-
-void BagReader::Contents::add(const slender_sim::RodState& rod)
-{
-  const std::size_t nodes = rod.nodes.size(), edges = rod.frames.size();
-  require(nodes >= 2 && edges == (rod.closed ? nodes : nodes - 1) && rod.velocities.size() == nodes &&
-              rod.twists.size() == nodes && rod.radii.size() == edges &&
-              (rod.radii_b.empty() || rod.radii_b.size() == edges),
-          "rod " + rod.name);
-  step = rod.step;
-  epoch = rod.epoch;
-  step_known = true;
-  out->rods.push_back({rod.name, rod.closed != 0, columnsOf(rod.nodes), columnsOf(rod.velocities),
-                       quaternions(rod.frames), numbers(rod.twists), numbers(rod.radii),
-                       numbers(rod.radii_b.empty() ? rod.radii : rod.radii_b)});
-  const RodSnapshot& read = out->rods.back();
-  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.twist.allFinite() &&
-                    read.radius_a.allFinite() && read.radius_b.allFinite(),
-                "rod " + rod.name);
-  require(!scene || rod.guide_nodes.empty() ||
-              appendFunctions(*scene, rod.name, "", columnsOf(rod.guide_nodes), columnsOf(rod.guide_forces),
-                              out->functions),
-          "state (what " + rod.name + " tracks)");
-}
-
-void BagReader::Contents::add(const slender_sim::ThreadState& thread)
-{
-  const std::size_t nodes = thread.nodes.size(), edges = thread.frames.size();
-  require(nodes >= 2 && edges == nodes - 1 && thread.ids.size() == nodes && thread.velocities.size() == nodes &&
-              thread.deposited.size() == nodes && thread.radii.size() == edges,
-          "thread " + thread.name);
-  step = thread.step;
-  epoch = thread.epoch;
-  step_known = true;
-  out->threads.push_back({thread.name, thread.thread_id, thread.ids, columnsOf(thread.nodes),
-                          columnsOf(thread.velocities), thread.deposited, quaternions(thread.frames),
-                          numbers(thread.radii)});
-  const ThreadSnapshot& read = out->threads.back();
-  requireFinite(read.x.allFinite() && read.v.allFinite() && allFinite(read.frames) && read.radius.allFinite(),
-                "thread " + thread.name);
-}
-
-/// Returns the last mesh of these cloths that was recorded before them, or nullptr.
-const slender_sim::MeshStamped* BagReader::Contents::meshOf(const slender_sim::ClothState& cloths) const
-{
-  const slender_sim::MeshStamped* found = nullptr;
-  for (const slender_sim::MeshStamped& mesh : meshes)
-    if (mesh.names == cloths.names && (!found || mesh.header.stamp <= cloths.header.stamp))
-      found = &mesh;
-  return found;
-}
-
-void BagReader::Contents::add(const slender_sim::ClothState& cloths)
-{
-  const std::size_t count = cloths.names.size();
-  require(cloths.offsets.size() == count && cloths.velocities.size() == cloths.vertices.size() &&
-              cloths.guide_offsets.size() == count && cloths.function_offsets.size() == count &&
-              cloths.function_sets.size() == count,
-          "state");
-  step = cloths.step;
-  epoch = cloths.epoch;
-  step_known = true;
-  const auto range = [count](const std::vector<std::uint32_t>& offsets, std::size_t k, std::size_t size) {
-    const std::size_t first = offsets[k], last = k + 1 < count ? offsets[k + 1] : size;
-    require(first <= last && last <= size, "state");
-    return std::pair(first, last);
-  };
-  for (std::size_t k = 0; k < count; ++k)
-  {
-    const auto [first, last] = range(cloths.offsets, k, cloths.vertices.size());
-    ClothSnapshot cloth{
-        cloths.names[k], columnsOf(cloths.vertices, first, last), columnsOf(cloths.velocities, first, last), {}};
-    requireFinite(cloth.x.allFinite() && cloth.v.allFinite(), "cloth " + cloth.name);
-    if (const slender_sim::MeshStamped* found = meshOf(cloths))
-    {
-      const slender_sim::MeshStamped& mesh = *found;
-      const auto [from, to] = range(mesh.triangle_offsets, k, mesh.triangles.size() / 3);
-      cloth.triangles.resize(3, static_cast<Eigen::Index>(to - from));
-      for (std::size_t i = 3 * from; i < 3 * to; ++i)
-      {
-        require(mesh.triangles[i] >= first && mesh.triangles[i] < last, "mesh");
-        cloth.triangles.data()[i - 3 * from] = static_cast<int>(mesh.triangles[i] - first);
-      }
-    }
-    out->cloths.push_back(std::move(cloth));
-    const auto [guide, guide_end] = range(cloths.guide_offsets, k, cloths.guide_vertices.size());
-    const auto [force, force_end] = range(cloths.function_offsets, k, cloths.guide_forces.size());
-    require(!scene || guide == guide_end ||
-                appendFunctions(*scene, cloths.names[k], cloths.function_sets[k],
-                                columnsOf(cloths.guide_vertices, guide, guide_end),
-                                columnsOf(cloths.guide_forces, force, force_end), out->functions),
-            "state (what " + cloths.names[k] + " tracks)");
-  }
-}
-
-void BagReader::Contents::add(const slender_sim::BodyStates& states, std::vector<SolidSnapshot>& solids)
-{
-  require(states.pose.size() == states.name.size() && states.twist.size() == states.name.size(), "body_states");
-  for (std::size_t b = 0; b < states.name.size(); ++b)
-    solids.push_back({states.name[b],
-                      recordedPose(states.pose[b]),
-                      {fromMessage(states.twist[b].linear), fromMessage(states.twist[b].angular)}});
-}
-
-void BagReader::Contents::add(const slender_sim::Fields& fields)
-{
-  // names of tables become names of files
-  static const std::set<std::string> known{"rod_fields", "thread_fields", "cloth_fields", "solid_fields", "energies"};
-  for (const slender_sim::FieldTable& from : fields.tables)
-  {
-    const std::size_t columns = from.columns.size(), rows = columns > 0 ? from.values.size() / columns : 0;
-    require(known.count(from.table) > 0 && columns > 0 && from.values.size() == rows * columns,
-            "fields (of " + from.object + ")");
-    FieldTable table{from.table, from.object, from.columns, Eigen::MatrixXd(rows, columns)};
-    for (std::size_t i = 0; i < from.values.size(); ++i)
-      table.values(static_cast<Eigen::Index>(i / columns), static_cast<Eigen::Index>(i % columns)) = from.values[i];
-    out->fields.push_back(std::move(table));
-  }
 }
 
 BagReader::BagReader(const std::string& path, const std::string& topic_namespace, const std::string& scene_folder)

@@ -247,9 +247,7 @@ double BodyPart::energyAtStart(double& allowance)
 
 void BodyPart::refuse(StepFailure failure, double, StepReport& report) const
 {
-  report.ok = false;
-  report.failure = failure;
-  report.message = "body '" + system.model().name + "': its motion was not found: use a shorter step";
+  report.refuse(failure, "body '" + system.model().name + "': its motion was not found: use a shorter step");
 }
 
 }   // namespace slender

@@ -9,22 +9,23 @@ namespace slender {
 
 /// Forces as the substep begins, and the velocities and positions that free nodes have by them alone; held nodes are
 /// put where their grasps will be.
-StepFailure RodStepper::Impl::explicitPredict(const RodInputs& inputs, double duration, double t, double h,
-                                              StepReport& report)
+StepFailure RodStepper::Impl::explicitPredict(const Substep& next_substep, StepReport& report)
 {
+  substep = next_substep;
   const int n = model->nodes();
-  const RodEvaluation now = evaluateStart(inputs, duration, t);
+  const double h = substep.length;
+  const RodEvaluation now = evaluateStart();
   if (now.min_chi <= kFoldedChi)
     return StepFailure::folded_back;
   if (!std::isfinite(now.energy()))
     return StepFailure::state_not_finite;
   report.max_strain = std::max(report.max_strain, now.max_strain);
-  elasticWrenches(inputs);
+  elasticWrenches();
 
   next = work;
   next.last_step = h;
   for (int i = 0; i < n; ++i)
-    next.v.col(i) = model->mass[i] * work.v.col(i) + h * nodeForce(inputs, i);
+    next.v.col(i) = model->mass[i] * work.v.col(i) + h * nodeForce(i);
   if (model->damped())   // by the velocity at the end of the step: linear, so it costs nothing to treat implicitly
     for (int i = 0; i < n; ++i)
       next.v.col(i) /= model->mass[i] + h * model->damping(i);
@@ -32,20 +33,20 @@ StepFailure RodStepper::Impl::explicitPredict(const RodInputs& inputs, double du
     for (int i = 0; i < n; ++i)
       next.v.col(i) /= model->mass[i];
   next.x += h * next.v;
-  holdNodes(inputs, duration, t + h);
+  holdNodes(substep.from + h);
   return StepFailure::none;
 }
 
-RodEvaluation RodStepper::Impl::evaluateStart(const RodInputs& inputs, double duration, double t)
+RodEvaluation RodStepper::Impl::evaluateStart()
 {
   if (isotropic)
     return isotropic->evaluate(work);
   system.leaveOutStretching(model->inextensible);
   system.load(work);
-  system.setTwistLoads(inputs.torques);
+  system.setTwistLoads(inputs->torques);
   if (model->stiffness_damping > 0)
   {
-    startStrainHistory(inputs, duration, t);
+    startStrainHistory();
     strain_reference = strain_start - work.strain_rate;   // rate over one second: ratio = damping
     system.setResponse(model->stiffness_damping, &strain_reference);
   }
@@ -60,10 +61,10 @@ RodEvaluation RodStepper::Impl::evaluateStart(const RodInputs& inputs, double du
 }
 
 /// What the rod's elasticity and its loads do to the grippers, and to the bodies that carry it, as the substep begins.
-void RodStepper::Impl::elasticWrenches(const RodInputs& inputs)
+void RodStepper::Impl::elasticWrenches()
 {
   wrenches.assign(wrenches.size(), Wrench());
-  addToWrenches([&](int i) { return nodeForce(inputs, i); }, true);
+  addToWrenches([&](int i) { return nodeForce(i); }, true);
   for (std::size_t k = 0; k < wrenches.size(); ++k)
     if (work.grasps[k].active)
       wrenches[k].torque +=
@@ -72,7 +73,7 @@ void RodStepper::Impl::elasticWrenches(const RodInputs& inputs)
 
 /// Positions and velocities of held nodes at an instant; those of grasps that bodies carry follow stage_poses and
 /// carried_velocity.
-void RodStepper::Impl::holdNodes(const RodInputs& inputs, double duration, double at)
+void RodStepper::Impl::holdNodes(double at)
 {
   for (std::size_t k = 0; k < next.grasps.size(); ++k)
   {
@@ -81,7 +82,7 @@ void RodStepper::Impl::holdNodes(const RodInputs& inputs, double duration, doubl
       continue;
     Twist velocity = carried_velocity[k];
     if (g.body < 0)
-      stage_poses[k] = graspPose((*origin)[k], inputs.grasps[k], duration, std::min(at / duration, 1.0), &velocity);
+      stage_poses[k] = graspPose(k, std::min(at / duration, 1.0), &velocity);
     for (int i = g.first_node; i <= g.last_node; ++i)
     {
       const Eigen::Vector3d arm = stage_poses[k].orientation * g.nodes_G[i - g.first_node];
@@ -92,10 +93,11 @@ void RodStepper::Impl::holdNodes(const RodInputs& inputs, double duration, doubl
 }
 
 /// End of the substep at the nodes' final positions: frames, twists, reactions, checks.
-StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double duration, double t, double h)
+StepFailure RodStepper::Impl::explicitFinish()
 {
   const int n = model->nodes();
-  holdNodes(inputs, duration, t + h);
+  const double h = substep.length;
+  holdNodes(substep.from + h);
   if (!next.x.allFinite() || !next.v.allFinite())
     return StepFailure::state_not_finite;
   // Newton's law of a held node: gripper's force = m a + damping - (internal and external forces); the rod's is the
@@ -137,12 +139,6 @@ StepFailure RodStepper::Impl::explicitFinish(const RodInputs& inputs, double dur
 }
 
 // ---- as a part of an island
-
-StepFailure RodPart::predict(const Substep& substep, StepReport& report)
-{
-  substep_ = substep;
-  return rod_.explicitPredict(*inputs_, duration_, substep.from, substep.length, report);
-}
 
 bool RodPart::addTo(FastProjection& projection)
 {
@@ -217,7 +213,7 @@ StepFailure RodPart::finishSubstep(StepReport&)
   if (!isExplicit(rod_.time.integrator))
     return StepFailure::none;
   takeCarriedMotion();
-  return rod_.explicitFinish(*inputs_, duration_, substep_.from, substep_.length);
+  return rod_.explicitFinish();
 }
 
 }   // namespace slender

@@ -59,27 +59,31 @@ bool RodPart::numberUnknowns()
 
 void RodPart::placeHeld(double fraction)
 {
-  rod_.placeAt(*inputs_, duration_, fraction);
+  rod_.placeAt(fraction);
   if (averages_)
     averages_->place(fraction);
 }
 
-bool RodPart::heldMoves(double from_fraction, double to_fraction) const
+/// Returns true if a grasp that no body carries goes elsewhere in the step. With `to_rest` this also holds for one that
+/// returns to where it was, with a velocity.
+bool RodPart::graspsMove(bool to_rest) const
 {
-  if (from_fraction == to_fraction)
-    return false;
-  if (averages_ && averages_->move())
-    return true;
   const std::vector<GraspState>& grasps = rod_.work.grasps;
   for (std::size_t k = 0; k < grasps.size(); ++k)
   {
-    const Pose &from = grasps[k].X_WG, &to = inputs_->grasps[k].X_WG;
+    const GraspTarget& target = rod_.inputs->grasps[k];
+    const Pose &from = grasps[k].X_WG, &to = target.X_WG;
     if (grasps[k].active && grasps[k].body < 0 &&
         (from.position != to.position || from.orientation.coeffs() != to.orientation.coeffs() ||
-         inputs_->grasps[k].velocity))
+         (to_rest && target.velocity)))
       return true;
   }
   return false;
+}
+
+bool RodPart::heldMoves(double from_fraction, double to_fraction) const
+{
+  return from_fraction != to_fraction && ((averages_ && averages_->move()) || graspsMove(true));
 }
 
 void RodPart::followJoints()
@@ -109,7 +113,7 @@ void RodPart::setCarriedInertia(const Stage& stage)
       const Eigen::Vector3d r = weld.X_BG * g.nodes_G[i - g.first_node];
       const double wm = m.mass[i] * inertia, wd = m.damping(i) * damping;
       system_.setInertia(i, wm + wd, (wm * body.inertiaTarget(r) + wd * body.dampingTarget(r)) / (wm + wd),
-                         rod_.load(*inputs_, i));
+                         rod_.load(i));
     }
   });
 }

@@ -34,9 +34,6 @@ public:
   };
   void addWeld(const Weld& weld);
   RodStepper::Impl& rod() const { return rod_; }
-  /// Inputs of a step of `duration` seconds. They must live as long as the step.
-  void begin(const RodInputs& inputs, double duration) { inputs_ = &inputs, duration_ = duration; }
-  const RodInputs& inputs() const { return *inputs_; }
   /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
   bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
 
@@ -96,21 +93,25 @@ private:
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double gap) const override;
   StepFailure finishSubstep(StepReport& report) override;
-  void acceptSubstep(const Substep& substep) override;
-  bool conserves() const override;
+  void acceptSubstep(const Substep&) override { rod_.accept(); }
+  bool conserves() const override { return !graspsMove(false); }
   double energyAtStart(double& allowance) override;
-  double energyAtEnd() const override { return rod_.endEnergy(*inputs_); }
+  double energyAtEnd() const override { return rod_.endEnergy(); }
   Largest unbalancedForce() const override { return rod_.unbalancedForce(); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
   // ---- its explicit steps, rod_explicit.cpp
-  StepFailure predict(const Substep& substep, StepReport& report) override;
+  StepFailure predict(const Substep& substep, StepReport& report) override
+  {
+    return rod_.explicitPredict(substep, report);
+  }
   bool addTo(FastProjection& projection) override;
   void giveTo(FastProjection& projection, bool at_start) override;
   StepFailure takeFrom(FastProjection& projection, const ProjectionReport& result, bool at_start) override;
   void takeStart(const FastProjection& projection);
 
   const RodSystem& system() const { return rod_.system; }
+  bool graspsMove(bool to_rest) const;
   const Weld* weldOf(int grasp) const;
   void columnsOf(int unknown, double weight, Columns& row) const;
   void addCarried(SharedMatrix& matrix) const;
@@ -125,11 +126,7 @@ private:
   const double shortest_edge_;   ///< at rest [m]
   ContactProperties contact_;
   std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
-  const StepPlan* plan_ = nullptr;
-  Substep substep_;
   std::vector<Weld> welds_;
-  const RodInputs* inputs_ = nullptr;
-  double duration_ = 1.0;
   int chain_ = -1;   ///< its number in the projection; -1: it stretches
   bool welded_ = false;
   long surface_version_ = 0;

@@ -7,9 +7,7 @@ namespace slender {
 
 StepFailure RodPart::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
-  plan_ = &plan;
-  substep_ = substep;
-  const StepFailure failure = rod_.beginStep(plan, *inputs_, duration_, substep.from, substep.length);
+  const StepFailure failure = rod_.beginSubstep(plan, substep);
   if (failure != StepFailure::none || !averages_)
     return failure;
   dependent_ = !averages_->prepare(rod_.model->mass, [this](int node) { return system_.isFree(node); });
@@ -24,7 +22,7 @@ void RodPart::addStartLoads()
   RodSystem& system = rod_.system;
   system.setResponse(0.0, nullptr);   // an attempt that failed leaves its viscous response
   for (int i = 0; i < system.nodes(); ++i)
-    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), rod_.load(*inputs_, i));
+    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), rod_.load(i));
   system.evaluateWhole(false);
   system.closeGradient();
   forActiveWelds([&](const Weld& weld, const GraspState& g) {
@@ -110,13 +108,14 @@ BarrierRange RodPart::barrierRange(double gap) const
 
 void RodPart::beginStage(std::size_t stage)
 {
-  rod_.beginStage(stage, *inputs_, duration_, substep_.from, substep_.length);
-  setCarriedInertia(plan_->stages[stage]);
+  const Stage& now = rod_.plan->stages[stage];
+  rod_.beginStage(stage);
+  setCarriedInertia(now);
   followJoints();
   if (!averages_)
     return;
   averages_->forces.setZero();
-  averages_->place((substep_.from + plan_->stages[stage].time * substep_.length) / duration_);
+  averages_->place((rod_.substep.from + now.time * rod_.substep.length) / rod_.duration);
   meetAverages();
 }
 
@@ -124,34 +123,15 @@ void RodPart::endStage(std::size_t stage, bool last, StepReport& report)
 {
   takeCarriedMotion();
   if (last)
-    rod_.finishStep(*inputs_, duration_, substep_.from, substep_.length, report);
+    rod_.finish(report);
   else
-    rod_.endStage(stage, *inputs_, duration_, substep_.from, substep_.length);
-}
-
-void RodPart::acceptSubstep(const Substep& substep)
-{
-  rod_.moveGrasps(*inputs_, duration_, substep.to);
-  std::swap(rod_.work, rod_.next);
-}
-
-bool RodPart::conserves() const
-{
-  const std::vector<GraspState>& grasps = rod_.work.grasps;
-  for (std::size_t k = 0; k < grasps.size(); ++k)
-    if (grasps[k].active && grasps[k].body < 0)
-    {
-      const Pose &from = grasps[k].X_WG, &to = inputs_->grasps[k].X_WG;
-      if (from.position != to.position || from.orientation.coeffs() != to.orientation.coeffs())
-        return false;
-    }
-  return true;
+    rod_.endStage(stage);
 }
 
 double RodPart::energyAtStart(double& allowance)
 {
   double own = 0.0;
-  const double energy = rod_.startEnergy(*inputs_, &own);
+  const double energy = rod_.startEnergy(&own);
   allowance += own;
   return energy;
 }

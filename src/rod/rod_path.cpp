@@ -5,7 +5,7 @@
 
 #include "slender_sim/dynamics/newton.h"
 #include "slender_sim/rod/rod_system.h"
-#include "statics_advice.h"
+#include "dynamics/statics_advice.h"
 
 namespace slender {
 
@@ -217,13 +217,11 @@ StepReport RodPath::advance(double share)
     ++report.substeps;
     return report;
   }
-  report.ok = false;
-  report.failure = StepFailure::newton_diverged;
-  report.message =
+  return report.refuse(
+      StepFailure::newton_diverged,
       "rod '" + m.model->name +
-      "': the path of equilibria could not be followed further: use more edges, or a small perturbation, which "
-      "rounds off the points where paths branch";
-  return report;
+          "': the path of equilibria could not be followed further: use more edges, or a small perturbation, which "
+          "rounds off the points where paths branch");
 }
 
 StepReport RodPath::settleAt(double factor)
@@ -233,12 +231,8 @@ StepReport RodPath::settleAt(double factor)
   m.reload();
   double at = factor;
   if (!m.correct(at, nullptr, 0.0, report.iterations))
-  {
-    report.ok = false;
-    report.failure = StepFailure::newton_diverged;
-    report.message = "rod '" + m.model->name + "': " + explainStatics(report.failure);
-    return report;
-  }
+    return report.refuse(StepFailure::newton_diverged,
+                         "rod '" + m.model->name + "': " + explainStatics(StepFailure::newton_diverged));
   m.factor = factor;
   m.system.store(m.state);
   return report;

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "slender_sim/dynamics/lowest_eigenvalue.h"
-#include "statics_advice.h"
+#include "dynamics/statics_advice.h"
 
 namespace slender {
 
@@ -16,7 +16,7 @@ namespace {
 class RodPencil
 {
 public:
-  RodPencil(RodStepper::Impl& rod, const RodInputs& inputs) : rod_(rod), inputs_(inputs)
+  explicit RodPencil(RodStepper::Impl& rod) : rod_(rod)
   {
     const RodModel& m = *rod.model;
     double inertia = 0.0;
@@ -31,7 +31,7 @@ public:
   RodEvaluation evaluate(double s, bool with_hessian)
   {
     for (int i = 0; i < rod_.model->nodes(); ++i)
-      rod_.system.setInertia(i, s * rod_.model->mass[i], rod_.system.position(i), rod_.load(inputs_, i));
+      rod_.system.setInertia(i, s * rod_.model->mass[i], rod_.system.position(i), rod_.load(i));
     // The system keeps rods that may spin freely definite by a share 1e-8 of the twist stiffness. On fine meshes that
     // is more than twisting of the whole rod costs, so that only what round-off needs is left of it: 1e-12.
     const double angle = (spin_ > 0 ? 1e-12 * unit_ : 0.0) + std::max(0.0, s) * edge_inertia_;
@@ -84,7 +84,7 @@ public:
     const int n = rod_.model->nodes();
     Eigen::VectorXd v(4 * n);
     for (int k = 0; k < 4 * n; ++k)
-      v[k] = std::sin(1.0 + 1.7 * k) + 0.5 * std::cos(0.3 * k);   // no symmetry that a mode could be orthogonal to
+      v[k] = startOfMode(k);
     for (int k = 0; k < 12; ++k)
     {
       for (int i = 0; i < n; ++i)
@@ -116,7 +116,6 @@ private:
   }
 
   RodStepper::Impl& rod_;
-  const RodInputs& inputs_;
   double edge_inertia_ = 0.0, spin_ = 0.0, unit_ = 0.0;
 };
 
@@ -136,16 +135,13 @@ void scaleToTurns(const RodModel& model, Eigen::VectorXd& v)
 
 }   // namespace
 
-RodStability assessStability(RodStepper::Impl& rod, const RodInputs& inputs, bool spectrum)
+RodStability assessStability(RodStepper::Impl& rod, bool spectrum)
 {
   RodStability result;
-  RodInputs targets = inputs;
-  for (GraspTarget& g : targets.grasps)
-    g.velocity.reset();
   rod.system.load(rod.work);
-  rod.system.setTwistLoads(inputs.torques);
-  rod.placeAt(targets, 1.0, 1.0);
-  RodPencil pencil(rod, inputs);
+  rod.system.setTwistLoads(rod.inputs->torques);
+  rod.placeAt(1.0);
+  RodPencil pencil(rod);
   const RodEvaluation at = pencil.evaluate(0.0, false);
   result.energy = at.energy();
   result.energy_noise = 1e-13 * (std::abs(at.stretch) + std::abs(at.bend_twist) + std::abs(at.potential));

@@ -16,7 +16,7 @@ struct RodStability : EquilibriumStability
   Eigen::VectorXd mode;
 };
 
-/// Of the configuration rod.work under these inputs. `spectrum` false: only the energy.
-RodStability assessStability(RodStepper::Impl& rod, const RodInputs& inputs, bool spectrum);
+/// Of the configuration rod.work under its inputs. `spectrum` false: only the energy.
+RodStability assessStability(RodStepper::Impl& rod, bool spectrum);
 
 }   // namespace slender

@@ -6,14 +6,14 @@
 
 namespace slender {
 
-StepFailure RodStepper::Impl::computeAcceleration(const RodInputs& inputs, double duration, double t)
+StepFailure RodStepper::Impl::computeAcceleration()
 {
   // at the start of a run: frames to equilibrium, then a = M^-1 F
   system.setResponse(0.0, nullptr);
-  system.setTwistLoads(inputs.torques);
+  system.setTwistLoads(inputs->torques);
   for (int i = 0; i < model->nodes(); ++i)
-    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(inputs, i));
-  placeAt(inputs, duration, t / duration);
+    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(i));
+  placeAt(substep.from / duration);
   if (system.evaluate(false).min_chi <= kFoldedChi)
     return StepFailure::folded_back;
   system.relaxFrames();
@@ -29,24 +29,23 @@ StepFailure RodStepper::Impl::computeAcceleration(const RodInputs& inputs, doubl
   return StepFailure::none;
 }
 
-StepFailure RodStepper::Impl::beginStep(const StepPlan& step_plan, const RodInputs& inputs, double duration, double t,
-                                        double h)
+StepFailure RodStepper::Impl::beginSubstep(const StepPlan& step_plan, const Substep& next_substep)
 {
-  (void)h;
   plan = &step_plan;
+  substep = next_substep;
   for (std::size_t k = 0; k < work.grasps.size(); ++k)
     if (work.grasps[k].active && work.grasps[k].body >= 0)
       stage_poses[k] = work.grasps[k].X_WG;   // an attempt that failed leaves its trial poses
   system.load(work);
   if ((plan->needs_acceleration || time.error_tolerance > 0) && work.a.cols() == 0)
   {
-    const StepFailure failure = computeAcceleration(inputs, duration, t);
+    const StepFailure failure = computeAcceleration();
     if (failure != StepFailure::none)
       return failure;
     system.load(work);
   }
   if (model->stiffness_damping > 0)
-    startStrainHistory(inputs, duration, t);
+    startStrainHistory();
   if (spins)
     beginSpins();
   next = work;
@@ -56,17 +55,18 @@ StepFailure RodStepper::Impl::beginStep(const StepPlan& step_plan, const RodInpu
 }
 
 /// Inertia and loads of a stage, and as its trial configuration the motion carried on.
-void RodStepper::Impl::beginStage(std::size_t s, const RodInputs& inputs, double duration, double t, double h)
+void RodStepper::Impl::beginStage(std::size_t s)
 {
   const Stage& stage = plan->stages[s];
+  const double h = substep.length;
   const double inertia = 1.0 / (stage.tau_a * stage.tau_a), damping = 1.0 / stage.tau_v;
   const double ahead = stage.time * h;
-  system.setTwistLoads(inputs.torques);
+  system.setTwistLoads(inputs->torques);
   for (int i = 0; i < model->nodes(); ++i)
   {
     const Eigen::Vector3d q_hat = combine(stage.q_hat, i), q_tilde = combine(stage.q_tilde, i);
     const double wm = model->mass[i] * inertia, wd = model->damping(i) * damping;
-    system.setInertia(i, system.isMoving(i) ? wm + wd : 0.0, (wm * q_hat + wd * q_tilde) / (wm + wd), load(inputs, i));
+    system.setInertia(i, system.isMoving(i) ? wm + wd : 0.0, (wm * q_hat + wd * q_tilde) / (wm + wd), load(i));
     Eigen::Vector3d guess = s == 0 ? Eigen::Vector3d(work.x.col(i) + ahead * work.v.col(i))
                                    : Eigen::Vector3d(stage_q.col(i) + (1 - plan->stages[0].time) * h * stage_v.col(i));
     if (s == 0 && work.a.cols() > 0)
@@ -75,19 +75,19 @@ void RodStepper::Impl::beginStage(std::size_t s, const RodInputs& inputs, double
   }
   if (spins)
     beginSpinStage(s, h);
-  placeAt(inputs, duration, (t + stage.time * h) / duration);
+  placeAt((substep.from + stage.time * h) / duration);
   if (model->stiffness_damping > 0)
     setViscousResponse(stage, h);
 }
 
 /// Takes over the solution of a stage that is not the last.
-void RodStepper::Impl::endStage(std::size_t s, const RodInputs& inputs, double duration, double t, double h)
+void RodStepper::Impl::endStage(std::size_t s)
 {
   const Stage& stage = plan->stages[s];
   for (int i = 0; i < model->nodes(); ++i)
   {
     stage_q.col(i) = system.position(i);
-    stage_v.col(i) = heldVelocity(inputs, duration, t + stage.time * h, i,
+    stage_v.col(i) = heldVelocity(substep.from + stage.time * substep.length, i,
                                   (stage_q.col(i) - combine(stage.q_tilde, i)) / stage.tau_v);
   }
   if (model->stiffness_damping > 0)
@@ -98,11 +98,11 @@ void RodStepper::Impl::endStage(std::size_t s, const RodInputs& inputs, double d
 }
 
 /// End of the step from its last stage: positions, velocities, accelerations, frames, reactions, history.
-void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report)
+void RodStepper::Impl::finish(StepReport& report)
 {
   const int n = model->nodes();
   const Stage& stage = plan->stages.back();
-  const double c = plan->fraction;
+  const double c = plan->fraction, h = substep.length, end = substep.from + h;
   const bool keep_a = plan->needs_acceleration || time.error_tolerance > 0;
   const bool keep_previous = time.integrator == Integrator::bdf2;
   if (keep_a)
@@ -114,7 +114,7 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
     const Eigen::Vector3d v = (q - combine(stage.q_tilde, i)) / stage.tau_v;
     const Eigen::Vector3d x0 = work.x.col(i), v0 = work.v.col(i);
     next.x.col(i) = c == 1.0 ? q : Eigen::Vector3d(x0 + (q - x0) / c);
-    next.v.col(i) = heldVelocity(inputs, duration, t + h, i, c == 1.0 ? v : Eigen::Vector3d(v0 + (v - v0) / c));
+    next.v.col(i) = heldVelocity(end, i, c == 1.0 ? v : Eigen::Vector3d(v0 + (v - v0) / c));
     if (!keep_a)
       continue;
     const bool free = system.isMoving(i);
@@ -126,7 +126,7 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
       jump = std::max(jump, order(time.integrator) == 2 ? (next.a.col(i) - a0).norm() : next.a.col(i).norm());
   }
   report.error_estimate = std::max(report.error_estimate, errorConstant(time.integrator) * h * h * jump);
-  computeWrenches(inputs, h);
+  computeWrenches(h);
   if (spins)
     finishSpins();
 
@@ -138,7 +138,7 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
     system.accept();
     for (int i = 0; i < n; ++i)
       system.setPosition(i, next.x.col(i));
-    placeAt(inputs, duration, (t + h) / duration);
+    placeAt(end / duration);
     for (int i = 0; i < n; ++i)
       next.x.col(i) = system.position(i);
     if (model->stiffness_damping > 0)
@@ -156,8 +156,7 @@ void RodStepper::Impl::finishStep(const RodInputs& inputs, double duration, doub
   next.last_step = h;
 }
 
-Eigen::Vector3d RodStepper::Impl::heldVelocity(const RodInputs& inputs, double duration, double at, int node,
-                                               const Eigen::Vector3d& otherwise)
+Eigen::Vector3d RodStepper::Impl::heldVelocity(double at, int node, const Eigen::Vector3d& otherwise)
 {
   if (system.isFree(node))
     return otherwise;
@@ -170,7 +169,7 @@ Eigen::Vector3d RodStepper::Impl::heldVelocity(const RodInputs& inputs, double d
       return carried_velocity[k].linear +
              carried_velocity[k].angular.cross(stage_poses[k].orientation * g.nodes_G[node - g.first_node]);
     Twist twist;
-    const Pose pose = graspPose(g, inputs.grasps[k], duration, std::min(at / duration, 1.0), &twist);
+    const Pose pose = graspPose(k, std::min(at / duration, 1.0), &twist);
     return twist.linear + twist.angular.cross(pose.orientation * g.nodes_G[node - g.first_node]);
   }
   return otherwise;
@@ -188,7 +187,7 @@ Eigen::Vector3d RodStepper::Impl::combine(const Combination& c, int i) const
   return sum;
 }
 
-void RodStepper::Impl::computeWrenches(const RodInputs&, double h)
+void RodStepper::Impl::computeWrenches(double h)
 {
   for (std::size_t k = 0; k < wrenches.size(); ++k)
   {

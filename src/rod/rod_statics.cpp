@@ -6,7 +6,7 @@
 #include "rod_stepper_impl.h"
 #include "slender_sim/dynamics/equilibrium_search.h"
 #include "slender_sim/geometry/rotation.h"
-#include "statics_advice.h"
+#include "dynamics/statics_advice.h"
 
 namespace slender {
 
@@ -15,7 +15,7 @@ namespace slender {
 class RodStepper::Impl::RodEquilibrium
 {
 public:
-  RodEquilibrium(Impl& rod, const RodInputs& inputs, StepReport& report);
+  RodEquilibrium(Impl& rod, StepReport& report);
   /// Number of moves in which the grasps can be carried to their targets: each at most 2 % of the length and 0.2 rad.
   /// 0: all are there.
   double moves() const;
@@ -38,33 +38,27 @@ public:
 
 private:
   Impl& rod_;
-  const RodInputs& inputs_;
   StepReport& report_;
-  RodInputs targets_;
   NewtonConfig newton_;
   double length_, unit_weight_;   ///< unit_weight_ [N/m]
   double twist_work_ = 0.0;       ///< of torques about tangents since the search began [J]
 };
 
-RodStepper::Impl::RodEquilibrium::RodEquilibrium(Impl& rod, const RodInputs& inputs, StepReport& report)
+RodStepper::Impl::RodEquilibrium::RodEquilibrium(Impl& rod, StepReport& report)
   : rod_(rod),
-    inputs_(inputs),
     report_(report),
-    targets_(inputs),
     newton_(rod.time.newton),
     length_(rod.model->rest_length.sum())
 {
-  for (GraspTarget& g : targets_.grasps)
-    g.velocity.reset();
   // Scale of the proximal weight: the stiffness of the whole rod against bending, or against its loads if that is
   // larger.
   const RodModel& model = *rod_.model;
   const double bend = std::max(model.bend_modulus.row(0).maxCoeff(), model.bend_modulus.row(2).maxCoeff());
   double load_total = 0.0;
   for (int i = 0; i < model.nodes(); ++i)
-    load_total += rod_.load(inputs, i).norm();
+    load_total += rod_.load(i).norm();
   unit_weight_ = std::max(bend / std::pow(length_, 3), load_total / length_) * 100.0 / model.nodes();
-  rod_.system.setTwistLoads(inputs.torques);
+  rod_.system.setTwistLoads(rod_.inputs->torques);
   newton_.tolerance = std::min(newton_.tolerance, 1e-8);
   newton_.max_iterations = std::max(60, newton_.max_iterations);
 }
@@ -75,7 +69,7 @@ double RodStepper::Impl::RodEquilibrium::moves() const
   for (std::size_t k = 0; k < rod_.work.grasps.size(); ++k)
     if (rod_.work.grasps[k].active)
     {
-      const Pose &a = rod_.work.grasps[k].X_WG, &b = inputs_.grasps[k].X_WG;
+      const Pose &a = rod_.work.grasps[k].X_WG, &b = rod_.inputs->grasps[k].X_WG;
       const double turn = rotationVector(a.orientation.conjugate() * b.orientation).norm();
       result = std::max({result, (b.position - a.position).norm() / (0.02 * length_), turn / 0.2});
     }
@@ -85,8 +79,8 @@ double RodStepper::Impl::RodEquilibrium::moves() const
 NewtonResult RodStepper::Impl::RodEquilibrium::round(double fraction, double weight)
 {
   rod_.system.load(rod_.work);
-  rod_.placeAt(targets_, 1.0, fraction);
-  rod_.carryFreeNodes(inputs_, weight * unit_weight_);
+  rod_.placeAt(fraction);
+  rod_.carryFreeNodes(weight * unit_weight_);
   const NewtonResult result = minimize(rod_.system, newton_);
   report_.factorizations += result.factorizations;
   if (!result.ok())
@@ -111,7 +105,7 @@ void RodStepper::Impl::RodEquilibrium::takeBase()
 
 EquilibriumStability RodStepper::Impl::RodEquilibrium::assess(bool spectrum)
 {
-  RodStability at = assessStability(rod_, inputs_, spectrum);
+  RodStability at = assessStability(rod_, spectrum);
   if (spectrum)
     rod_.lowest_mode = std::move(at.mode);
   at.work = twist_work_;
@@ -127,7 +121,7 @@ void RodStepper::Impl::RodEquilibrium::restore(const Configuration& c)
 bool RodStepper::Impl::RodEquilibrium::displace(double turn)
 {
   rod_.system.load(rod_.work);
-  rod_.placeAt(targets_, 1.0, 1.0);
+  rod_.placeAt(1.0);
   Eigen::Map<Eigen::VectorXd>(rod_.system.direction(), rod_.lowest_mode.size()) = rod_.lowest_mode;
   rod_.system.moveAlong(turn);
   if (rod_.system.evaluate(false).min_chi <= kFoldedChi)
@@ -138,15 +132,18 @@ bool RodStepper::Impl::RodEquilibrium::displace(double turn)
 }
 
 /// Loads `state` for statics. Returns false, with the report refused, when an input is not valid.
-bool RodStepper::Impl::beginStatics(const RodState& state, const RodInputs& inputs, StepReport& report)
+bool RodStepper::Impl::beginStatics(const RodState& state, const RodInputs& loads, StepReport& report)
 {
   std::string what;
-  if (!inputsFinite(state, inputs, what))
+  if (!inputsFinite(state, loads, what))
   {
     refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
     return false;
   }
-  begin(state);
+  statics_inputs = loads;
+  for (GraspTarget& g : statics_inputs.grasps)
+    g.velocity.reset();
+  begin(state, statics_inputs, 1.0);
   addFrames(*model, work);
   system.leaveOutStretching(false);
   system.load(work);
@@ -154,10 +151,10 @@ bool RodStepper::Impl::beginStatics(const RodState& state, const RodInputs& inpu
   return true;
 }
 
-StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
+StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& loads, bool leave_saddles)
 {
   StepReport report;
-  if (!beginStatics(state, inputs, report))
+  if (!beginStatics(state, loads, report))
     return report;
   work.forgetHistory();
   work.v.setZero();
@@ -166,47 +163,47 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
   const std::vector<GraspState> start = work.grasps;
   origin = &start;
 
-  RodEquilibrium equilibrium(*this, inputs, report);
+  RodEquilibrium equilibrium(*this, report);
   EquilibriumSearch<RodEquilibrium> search(equilibrium, report);
   if (!search.carry(equilibrium.moves()) || !search.settleStably(leave_saddles))
     return refuse(report, search.failure(), explainStatics(search.failure()));
-  evaluateEquilibrium(inputs, report);
+  evaluateEquilibrium(report);
   if (!(report.residual < kMostUnbalanced))
     return refuse(report, StepFailure::newton_diverged,
                   "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
                   "grasp, or let it move by time stepping (start: as_given)");
   for (std::size_t k = 0; k < work.grasps.size(); ++k)
     if (work.grasps[k].active)
-      work.grasps[k].X_WG = {inputs.grasps[k].X_WG.position, inputs.grasps[k].X_WG.orientation.normalized()};
+      work.grasps[k].X_WG = {loads.grasps[k].X_WG.position, loads.grasps[k].X_WG.orientation.normalized()};
   state = work;
   return report;
 }
 
-StepReport RodStepper::Impl::assessEquilibrium(const RodState& state, const RodInputs& inputs)
+StepReport RodStepper::Impl::assessEquilibrium(const RodState& state, const RodInputs& loads)
 {
   StepReport report;
-  if (!beginStatics(state, inputs, report))
+  if (!beginStatics(state, loads, report))
     return report;
-  RodStability at = assessStability(*this, inputs, true);
+  RodStability at = assessStability(*this, true);
   report.energy = at.energy;
   report.lowest_eigenvalue = at.lowest;
   report.stable = at.stable;
   lowest_mode = std::move(at.mode);
-  evaluateEquilibrium(inputs, report);
+  evaluateEquilibrium(report);
   return report;
 }
 
 /// Trial of a round: free nodes, and what the proximal term holds them to, go along with the grasps, by the
 /// displacements of the held nodes before and after them. Otherwise a move longer than an edge would fold the rod next
 /// to the grasp.
-void RodStepper::Impl::carryFreeNodes(const RodInputs& inputs, double weight)
+void RodStepper::Impl::carryFreeNodes(double weight)
 {
   const int n = model->nodes();
   const auto moved = [&](int i) { return Eigen::Vector3d(system.position(i % n) - work.x.col(i % n)); };
   const auto place = [&](int i, const Eigen::Vector3d& by) {
     const Eigen::Vector3d x = work.x.col(i % n) + by;
     system.setPosition(i % n, x);
-    system.setInertia(i % n, weight, x, load(inputs, i % n));
+    system.setInertia(i % n, weight, x, load(i % n));
   };
   int first = 0;
   while (first < n && system.isFree(first))
@@ -223,7 +220,7 @@ void RodStepper::Impl::carryFreeNodes(const RodInputs& inputs, double weight)
   const int end = model->closed ? first + n : n;   // a loop ends at its first held node again
   for (int left = first; left < end;)
   {
-    system.setInertia(left % n, 0.0, Eigen::Vector3d::Zero(), load(inputs, left % n));
+    system.setInertia(left % n, 0.0, Eigen::Vector3d::Zero(), load(left % n));
     int right = left + 1;
     while (right < end && system.isFree(right % n))
       ++right;
@@ -235,20 +232,17 @@ void RodStepper::Impl::carryFreeNodes(const RodInputs& inputs, double weight)
 }
 
 /// Residual, strain and wrenches of the equilibrium `work`.
-void RodStepper::Impl::evaluateEquilibrium(const RodInputs& inputs, StepReport& report)
+void RodStepper::Impl::evaluateEquilibrium(StepReport& report)
 {
   system.load(work);
-  RodInputs targets = inputs;
-  for (GraspTarget& g : targets.grasps)
-    g.velocity.reset();
-  placeAt(targets, 1.0, 1.0);
+  placeAt(1.0);
   for (int i = 0; i < model->nodes(); ++i)
-    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(inputs, i));
+    system.setInertia(i, 0.0, Eigen::Vector3d::Zero(), load(i));
   system.evaluate(false);
   report.residual = system.residual() / system.forceScale();
   for (int j = 0; j < model->edges(); ++j)
     report.max_strain = std::max(report.max_strain, std::abs(system.arrays().strain[j]));
-  computeWrenches(inputs, 0.0);
+  computeWrenches(0.0);
 }
 
 }   // namespace slender

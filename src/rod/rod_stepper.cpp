@@ -21,11 +21,7 @@ public:
   }
 
   /// From what the rod has loaded.
-  StepReport step(const RodInputs& inputs, double duration)
-  {
-    part_.begin(inputs, duration);
-    return island_.step(duration, rod_.work.next_step);
-  }
+  StepReport step() { return island_.step(rod_.duration, rod_.work.next_step); }
 
 private:
   Impl& rod_;
@@ -52,8 +48,8 @@ StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double dur
                          what + " is not finite or not valid; correct this input");
   if (!alone_)
     alone_ = std::make_unique<Alone>(*impl_);
-  impl_->begin(state);
-  report = alone_->step(inputs, duration);
+  impl_->begin(state, inputs, duration);
+  report = alone_->step();
   if (report.ok)
     state = impl_->work;
   return report;
@@ -86,8 +82,10 @@ RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t)
     isotropic = std::make_unique<IsotropicRod>(*model, system);
 }
 
-void RodStepper::Impl::begin(const RodState& state)
+void RodStepper::Impl::begin(const RodState& state, const RodInputs& step_inputs, double step_duration)
 {
+  inputs = &step_inputs;
+  duration = step_duration;
   const std::size_t grasps = state.grasps.size();
   stage_poses.resize(grasps);
   carried_velocity.resize(grasps);
@@ -102,7 +100,7 @@ void RodStepper::Impl::begin(const RodState& state)
     addFrames(*model, work);
 }
 
-void RodStepper::Impl::moveGrasps(const RodInputs& inputs, double duration, double t)
+void RodStepper::Impl::accept()
 {
   for (std::size_t k = 0; k < next.grasps.size(); ++k)
   {
@@ -115,8 +113,9 @@ void RodStepper::Impl::moveGrasps(const RodInputs& inputs, double duration, doub
       g.velocity = carried_velocity[k];
     }
     else
-      g.X_WG = graspPose((*origin)[k], inputs.grasps[k], duration, t / duration, &g.velocity);
+      g.X_WG = graspPose(k, substep.to / duration, &g.velocity);
   }
+  std::swap(work, next);
 }
 
 bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const
@@ -182,30 +181,21 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
          check(framesFit(*model, state) && (state.framed() || without_frames), "the set of material frames");
 }
 
-/// Pose (and velocity) of a grasp at a fraction of the whole step: uniform motion, or a cubic through both ends'
-/// velocities.
-Pose RodStepper::Impl::graspPose(const GraspState& start, const GraspTarget& target, double duration, double s,
-                                 Twist* velocity)
-{
-  return poseBetween(start.X_WG, start.velocity, target, duration, s, velocity);
-}
-
-double RodStepper::Impl::startEnergy(const RodInputs& inputs, double* allowance)
+double RodStepper::Impl::startEnergy(double* allowance)
 {
   system.load(work);
   system.setResponse(0.0, nullptr);
-  return mechanicalEnergy(work, inputs, system.evaluate(false), allowance);
+  return mechanicalEnergy(work, system.evaluate(false), allowance);
 }
 
 /// Elastic (as evaluated) plus kinetic energy and the loads' potential. `allowance`: growth that errors of a sound step
 /// may show.
-double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e,
-                                          double* allowance) const
+double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodEvaluation& e, double* allowance) const
 {
   double kinetic = 0.0, potential = 0.0, weight = 0.0;
   for (int i = 0; i < model->nodes(); ++i)
   {
-    const Eigen::Vector3d f = load(inputs, i);
+    const Eigen::Vector3d f = load(i);
     kinetic += 0.5 * model->mass[i] * s.v.col(i).squaredNorm();
     potential -= f.dot(s.x.col(i));
     weight += f.norm();
@@ -219,10 +209,7 @@ double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodInputs& in
 
 StepReport RodStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message)
 {
-  report.ok = false;
-  report.failure = failure;
-  report.message = "rod '" + model->name + "': " + message;
-  return report;
+  return report.refuse(failure, "rod '" + model->name + "': " + message);
 }
 
 std::string RodStepper::Impl::explainFailure(StepFailure failure, double length) const
@@ -306,22 +293,22 @@ void RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, d
   refuse(report, failure, (why.empty() ? explainFailure(failure, length) : why) + text);
 }
 
-void RodStepper::Impl::placeAt(const RodInputs& inputs, double duration, double fraction)
+void RodStepper::Impl::placeAt(double fraction)
 {
   for (std::size_t k = 0; k < stage_poses.size(); ++k)
     if (work.grasps[k].active && work.grasps[k].body < 0)
-      stage_poses[k] = graspPose((*origin)[k], inputs.grasps[k], duration, fraction, nullptr);
+      stage_poses[k] = graspPose(k, fraction, nullptr);
   system.placeGrasps(stage_poses);
 }
 
 /// load per node that does not depend on the configuration: weight, wind drag, extra forces
-Eigen::Vector3d RodStepper::Impl::load(const RodInputs& inputs, int i) const
+Eigen::Vector3d RodStepper::Impl::load(int i) const
 {
-  Eigen::Vector3d f = model->mass[i] * inputs.gravity;
+  Eigen::Vector3d f = model->mass[i] * inputs->gravity;
   if (model->drag.size() > 0)
-    f += model->drag[i] * inputs.wind;
-  if (inputs.forces.cols() > 0)
-    f += inputs.forces.col(i);
+    f += model->drag[i] * inputs->wind;
+  if (inputs->forces.cols() > 0)
+    f += inputs->forces.col(i);
   return f;
 }
 

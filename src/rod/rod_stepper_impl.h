@@ -8,6 +8,7 @@
 #include "slender_sim/rod/isotropic_rod.h"
 #include "slender_sim/dynamics/integrator.h"
 #include "slender_sim/dynamics/newton.h"
+#include "slender_sim/dynamics/substep_controller.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/rod/rod_system.h"
 
@@ -32,36 +33,38 @@ public:
   std::vector<Pose> stage_poses;
   std::vector<Twist> carried_velocity;   ///< of the frames of grasps carried by bodies
 
-  // rod_stepper.cpp: a whole step from t = 0 to duration, in substeps of h
-  void begin(const RodState& state);
+  // rod_stepper.cpp: a whole step, in substeps
+  /// The inputs must live as long as the step of `duration` seconds.
+  void begin(const RodState& state, const RodInputs& step_inputs, double step_duration);
   bool inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const;
-  /// The grasps of `next` move on, so that clamps measure turns from where they are.
-  void moveGrasps(const RodInputs& inputs, double duration, double t);
+  /// Takes the end of the substep as the present state. Its grasps move on, so that clamps measure turns from where
+  /// they are.
+  void accept();
   /// Held nodes and frames at a fraction of the step; poses of carried grasps stay as they are.
-  void placeAt(const RodInputs& inputs, double duration, double fraction);
+  void placeAt(double fraction);
   RodEnergies energies(const RodState& state, const Eigen::Vector3d& gravity);
-  double startEnergy(const RodInputs& inputs, double* allowance);
-  double endEnergy(const RodInputs& inputs) const { return mechanicalEnergy(next, inputs, end_evaluation, nullptr); }
+  double startEnergy(double* allowance);
+  double endEnergy() const { return mechanicalEnergy(next, end_evaluation, nullptr); }
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message);
   /// Largest unbalanced force [N] on a free node in the last evaluation of an implicit step.
   Largest unbalancedForce() const;
   /// Refuses a step of `length` seconds that could not be solved. The message says why and where the rod was farthest
   /// from a solution. `why`: takes the place of explainFailure(); empty: nothing does.
   void refuseUnsolved(StepReport& report, StepFailure failure, double length, const std::string& why);
-  Eigen::Vector3d load(const RodInputs& inputs, int node) const;
+  Eigen::Vector3d load(int node) const;
 
-  // rod_stages.cpp: an implicit substep; the stages' equations are solved between beginStage and endStage or finishStep
-  StepFailure beginStep(const StepPlan& plan, const RodInputs& inputs, double duration, double t, double h);
-  void beginStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
-  void endStage(std::size_t stage, const RodInputs& inputs, double duration, double t, double h);
-  void finishStep(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
+  // rod_stages.cpp: an implicit substep; the stages' equations are solved between beginStage and endStage or finish
+  StepFailure beginSubstep(const StepPlan& step_plan, const Substep& next_substep);
+  void beginStage(std::size_t stage);
+  void endStage(std::size_t stage);
+  void finish(StepReport& report);
 
   /// From now on edges have inertia about their tangents, see RodState::spin.
   void keepSpins();
 
   // rod_explicit.cpp: an explicit substep; bodies move and constraints are projected between its two functions
-  StepFailure explicitPredict(const RodInputs& inputs, double duration, double t, double h, StepReport& report);
-  StepFailure explicitFinish(const RodInputs& inputs, double duration, double t, double h);
+  StepFailure explicitPredict(const Substep& next_substep, StepReport& report);
+  StepFailure explicitFinish();
   /// Adds force(node) [N] on each node of active grasps to the wrenches of these. Those of grasps that bodies carry
   /// change only with `carried`.
   template <class Force>
@@ -80,19 +83,29 @@ public:
   }
   std::array<int, 2> overstretched{-1, -1};   ///< held nodes that the last failed projection found too far apart
 
+  const RodInputs* inputs = nullptr;   ///< of the step
+  double duration = 1.0;               ///< of the step [s]
+  const StepPlan* plan = nullptr;      ///< of the substep
+  Substep substep;
+
 private:
   double spinEnergy(const RodState& state) const
   {
     return state.spin.size() > 0 ? 0.5 * model->spin_inertia.dot(state.spin.cwiseAbs2()) : 0.0;
   }
-  double mechanicalEnergy(const RodState& s, const RodInputs& inputs, const RodEvaluation& e, double* allowance) const;
+  double mechanicalEnergy(const RodState& s, const RodEvaluation& e, double* allowance) const;
   std::string explainFailure(StepFailure failure, double length) const;
-  static Pose graspPose(const GraspState& start, const GraspTarget& target, double duration, double s, Twist* velocity);
-  StepFailure computeAcceleration(const RodInputs& inputs, double duration, double t);
-  Eigen::Vector3d heldVelocity(const RodInputs& inputs, double duration, double at, int node,
-                               const Eigen::Vector3d& otherwise);
+  /// Pose (and velocity) of a grasp at a fraction of the whole step: uniform motion, or a cubic through both ends'
+  /// velocities.
+  Pose graspPose(std::size_t grasp, double fraction, Twist* velocity) const
+  {
+    const GraspState& start = (*origin)[grasp];
+    return poseBetween(start.X_WG, start.velocity, inputs->grasps[grasp], duration, fraction, velocity);
+  }
+  StepFailure computeAcceleration();
+  Eigen::Vector3d heldVelocity(double at, int node, const Eigen::Vector3d& otherwise);
   Eigen::Vector3d combine(const Combination& c, int node) const;
-  void computeWrenches(const RodInputs& inputs, double h);
+  void computeWrenches(double h);
 
   // rod_spin.cpp: turns of edges about their tangents, with inertia
   double combineTurn(const Combination& c, int edge) const;
@@ -102,31 +115,31 @@ private:
   void finishSpins();
 
   // rod_explicit.cpp
-  RodEvaluation evaluateStart(const RodInputs& inputs, double duration, double t);
+  RodEvaluation evaluateStart();
   /// Of its elasticity and its loads on a node [N].
-  Eigen::Vector3d nodeForce(const RodInputs& inputs, int node) const
+  Eigen::Vector3d nodeForce(int node) const
   {
-    return load(inputs, node) - (isotropic ? isotropic->nodeGradient(node) : system.nodeGradient(node));
+    return load(node) - (isotropic ? isotropic->nodeGradient(node) : system.nodeGradient(node));
   }
-  void elasticWrenches(const RodInputs& inputs);
-  void holdNodes(const RodInputs& inputs, double duration, double at);
+  void elasticWrenches();
+  void holdNodes(double at);
 
   // rod_statics.cpp
   class RodEquilibrium;
-  bool beginStatics(const RodState& state, const RodInputs& inputs, StepReport& report);
-  void carryFreeNodes(const RodInputs& inputs, double weight);
-  void evaluateEquilibrium(const RodInputs& inputs, StepReport& report);
+  bool beginStatics(const RodState& state, const RodInputs& loads, StepReport& report);
+  void carryFreeNodes(double weight);
+  void evaluateEquilibrium(StepReport& report);
 
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
-  void startStrainHistory(const RodInputs& inputs, double duration, double t);
+  void startStrainHistory();
   void setViscousResponse(const Stage& stage, double h);
   void setViscousResponseAtEnd(const Stage& stage, double h);
   void finishStrainHistory(const Stage& stage);
 
   bool without_frames;   ///< a state may come without them
   const std::vector<GraspState>* origin = nullptr;
-  const StepPlan* plan = nullptr;   ///< of the substep
-  RodEvaluation end_evaluation;     ///< at the end of a substep whose stage lies inside it
+  RodInputs statics_inputs;       ///< of an equilibrium, whose grasps stand still
+  RodEvaluation end_evaluation;   ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
   bool spins = false;
   Eigen::VectorXd stage_turn, stage_spin;

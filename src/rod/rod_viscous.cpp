@@ -5,9 +5,9 @@
 
 namespace slender {
 
-void RodStepper::Impl::startStrainHistory(const RodInputs& inputs, double duration, double t)
+void RodStepper::Impl::startStrainHistory()
 {
-  placeAt(inputs, duration, t / duration);
+  placeAt(substep.from / duration);
   system.evaluate(false);
   system.strains(strain_start);
   if (work.strain_rate.cols() != strain_start.cols())

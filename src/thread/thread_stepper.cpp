@@ -126,12 +126,8 @@ bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs&
 
 StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message) const
 {
-  report.ok = false;
-  report.failure = failure;
-  report.message = "thread '" + model->name + "'" +
-                   (work.thread_id > 0 ? ", piece " + std::to_string(work.thread_id) + " that broke off" : "") + ": " +
-                   message;
-  return report;
+  const std::string piece = work.thread_id > 0 ? ", piece " + std::to_string(work.thread_id) + " that broke off" : "";
+  return report.refuse(failure, "thread '" + model->name + "'" + piece + ": " + message);
 }
 
 std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "cloth/cloth_stepper_impl.h"
 #include "meeting.h"
 #include "tracked_parts.h"
 
@@ -15,43 +16,41 @@ ClothObject::ClothObject(const WorldModel& world, int number)
   if (!model_.contact)
   {
     stepper_ = std::make_unique<ClothStepper>(model_.model, model_.options);
+    part_ = &stepper_->impl().part();
     return;
   }
-  part_ = std::make_unique<ClothPart>(model_.model, model_.options);
+  own_part_ = std::make_unique<ClothPart>(model_.model, model_.options);
+  part_ = own_part_.get();
   part_->setContact(*model_.contact, world.time.step, model_.ignored);
 }
 
 bool ClothObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
   const ClothState& from = state.cloths[index];
-  inputs_ = &inputs.cloths[index];
+  const ClothInputs* own = &inputs.cloths[index];
   if (tracks())
   {
     trackedInputs(world_, index, state, inputs, tracked_inputs_);
-    inputs_ = &tracked_inputs_;
+    own = &tracked_inputs_;
   }
+  const double duration = world_.time.step;
   if (stepper_)
-  {
-    work_ = from;
-    return true;
-  }
-  if (!part_->accepts(from, *inputs_, world_.time.step, report))
+    return stepper_->impl().load(from, *own, duration, report);
+  if (!part_->accepts(from, *own, duration, report))
     return false;
-  part_->begin(from, *inputs_, world_.time.step);
+  part_->begin(from, *own, duration);
   return true;
 }
 
 void ClothObject::addParts(std::vector<Part*>& parts)
 {
-  if (part_)
-    parts.push_back(part_.get());
+  if (own_part_)
+    parts.push_back(part_);
 }
 
 std::optional<StepReport> ClothObject::stepAlone()
 {
-  if (!stepper_)
-    return std::nullopt;
-  return stepper_->step(work_, *inputs_, world_.time.step);
+  return stepper_ ? std::make_optional(stepper_->impl().advance()) : std::nullopt;
 }
 
 IslandFinder::Reach ClothObject::reach() const
@@ -60,24 +59,15 @@ IslandFinder::Reach ClothObject::reach() const
   return {contact.has_value(), contact && contact->others, contact && contact->solids, false, BoundingBox::empty()};
 }
 
-void ClothObject::finish(WorldState& state)
-{
-  if (stepper_)
-    std::swap(state.cloths[index], work_);
-  else
-    part_->end(state.cloths[index]);
-}
-
 void ClothObject::finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const
 {
   if (tracks())
-    takeClothGuide(world_, index, tracked_inputs_.averages,
-                   stepper_ ? stepper_->averageForces() : part_->stages().average_forces, inputs, state, report);
+    takeClothGuide(world_, index, tracked_inputs_.averages, part_->stages().average_forces, inputs, state, report);
 }
 
 void ClothObject::addTo(Meeting& meeting, const WorldState& state)
 {
-  if (!part_)
+  if (!model_.contact)
     return;
   part_->setPins(state.cloths[index].pins);
   part_->addSurface(meeting.surface);
@@ -91,16 +81,6 @@ StepReport ClothObject::solveEquilibrium(WorldState& state, const WorldInputs& i
   if (!stepper_)
     throw std::invalid_argument("cloth with contact has no statics");
   return stepper_->solveEquilibrium(state.cloths[index], inputs.cloths[index]);
-}
-
-const Eigen::Matrix3Xd& ClothObject::pinForces() const
-{
-  return stepper_ ? stepper_->pinForces() : part_->stages().pin_forces;
-}
-
-ClothEnergies ClothObject::energies(const ClothState& state, const Eigen::Vector3d& gravity) const
-{
-  return stepper_ ? stepper_->energies(state, gravity) : part_->stages().energies(state, gravity);
 }
 
 }   // namespace slender

@@ -22,27 +22,24 @@ public:
   void addParts(std::vector<Part*>& parts) override;
   std::optional<StepReport> stepAlone() override;
   IslandFinder::Reach reach() const override;
-  void finish(WorldState& state) override;
+  void finish(WorldState& state) override { part_->end(state.cloths[index]); }
   void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const override;
   ContactMemory& contact(WorldState& state) const override { return state.contact.cloths[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;
 
-  /// Null: the cloth touches nothing.
-  const ClothPart* part() const { return part_.get(); }
+  /// State, forces and energies of the last step.
+  ClothPart& part() const { return *part_; }
   /// Throws std::invalid_argument for a cloth that touches something or tracks a guide.
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs);
-  const Eigen::Matrix3Xd& pinForces() const;
-  ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
 
 private:
   bool tracks() const { return model_.tracked.sets != nullptr; }
 
   const WorldModel& world_;
   const WorldModel::Cloth& model_;
-  std::unique_ptr<ClothPart> part_;
-  std::unique_ptr<ClothStepper> stepper_;   ///< null if part_ is not null
-  ClothState work_;                         ///< of stepper_
-  const ClothInputs* inputs_ = nullptr;     ///< of the present step
+  std::unique_ptr<ClothStepper> stepper_;   ///< of a cloth that touches nothing
+  std::unique_ptr<ClothPart> own_part_;     ///< of one that does
+  ClothPart* part_ = nullptr;               ///< either that one or that of the stepper
   ClothInputs tracked_inputs_;              ///< those of the world, with the averages
 };
 

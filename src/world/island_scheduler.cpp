@@ -99,17 +99,6 @@ Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const
   return forces;
 }
 
-Eigen::Matrix3Xd IslandScheduler::rodContactForces(int place) const
-{
-  return contactForces(objects_.rods[place], *objects_.rods[place].part);
-}
-
-Eigen::Matrix3Xd IslandScheduler::clothContactForces(int cloth) const
-{
-  const ClothPart* part = objects_.cloths[cloth].part();
-  return part ? contactForces(objects_.cloths[cloth], *part) : Eigen::Matrix3Xd(3, 0);
-}
-
 // ---- statics
 
 StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInputs& inputs)

@@ -33,14 +33,24 @@ public:
   void setThreads(int threads) override { loop_.threads = threads; }
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
   {
-    return objects_.cloths[cloth].energies(state, gravity);
+    return objects_.cloths[cloth].part().stages().energies(state, gravity);
   }
-  const Eigen::Matrix3Xd& pinForces(int cloth) const override { return objects_.cloths[cloth].pinForces(); }
-  Eigen::Matrix3Xd clothContactForces(int cloth) const override;
+  const Eigen::Matrix3Xd& pinForces(int cloth) const override
+  {
+    return objects_.cloths[cloth].part().stages().pin_forces;
+  }
+  Eigen::Matrix3Xd clothContactForces(int cloth) const override
+  {
+    return contactForces(objects_.cloths[cloth], objects_.cloths[cloth].part());
+  }
 
   /// A rod, named by its place in the content.
   RodObject& rod(int place) { return objects_.rods[place]; }
-  Eigen::Matrix3Xd rodContactForces(int place) const;   ///< on its nodes [N]
+  /// On its nodes [N]; without columns for a rod that touches nothing.
+  Eigen::Matrix3Xd rodContactForces(int place) const
+  {
+    return contactForces(objects_.rods[place], *objects_.rods[place].part);
+  }
 
 private:
   Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part) const;

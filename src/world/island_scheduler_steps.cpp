@@ -29,12 +29,11 @@ bool IslandScheduler::endsHaveRoom(const WorldState& state, const WorldInputs& i
           if (room >= std::min(radius, distanceToShape(obstacle.shape, state.obstacles[o], from, from)))
             continue;
           const ThreadModel& model = *thread.model.model;
-          report.ok = false;
-          report.failure = StepFailure::squeezed;
-          report.message = "obstacle '" + obstacle.name + "' comes within " + std::to_string(1e3 * room) +
-                           " mm of the " + (end && model.nozzle_diameter > 0 ? "nozzle" : "held end") + " of thread '" +
-                           model.name + "', which is " + std::to_string(1e3 * radius) +
-                           " mm in radius there: keep them further apart";
+          report.refuse(StepFailure::squeezed,
+                        "obstacle '" + obstacle.name + "' comes within " + std::to_string(1e3 * room) + " mm of the " +
+                            (end && model.nozzle_diameter > 0 ? "nozzle" : "held end") + " of thread '" + model.name +
+                            "', which is " + std::to_string(1e3 * radius) +
+                            " mm in radius there: keep them further apart");
           return false;
         }
       }

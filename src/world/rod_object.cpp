@@ -59,8 +59,7 @@ RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time
 
 bool RodObject::load(const WorldState& state, const WorldInputs& with, StepReport& report)
 {
-  stepper->begin(state.rods[index]);
-  part->begin(inputs, duration_);
+  stepper->begin(state.rods[index], inputs, duration_);
   if (!constraints)
     return true;
   constraints->averages(with.rod_guides[index], targets_);

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <stdexcept>
-
 #include "slender_sim/world/world_model.h"
 #include "slender_sim/world/world_state.h"
 
@@ -31,9 +29,10 @@ public:
   virtual void setThreads(int) {}
 
   // ---- of groups that hold cloths
-  virtual ClothEnergies clothEnergies(int, const ClothState&, const Eigen::Vector3d&) const { return {}; }
-  virtual const Eigen::Matrix3Xd& pinForces(int) const { throw std::logic_error("this group has no cloths"); }
-  virtual Eigen::Matrix3Xd clothContactForces(int) const { return Eigen::Matrix3Xd(3, 0); }
+  virtual ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const = 0;
+  virtual const Eigen::Matrix3Xd& pinForces(int cloth) const = 0;
+  /// Without columns before the first step.
+  virtual Eigen::Matrix3Xd clothContactForces(int cloth) const = 0;
   virtual void check(WorldState&) {}   ///< Throws std::invalid_argument where its cloths cross something.
 };
 

@@ -26,6 +26,14 @@ bool byImpulses(const WorldModel::Cloth& cloth)
   return cloth.contact && cloth.contact->method == ContactMethod::impulses;
 }
 
+/// The forces on so many points, zero if they are not known.
+Eigen::Matrix3Xd orZero(Eigen::Matrix3Xd forces, int points)
+{
+  if (forces.cols() == 0)
+    forces.setZero(3, points);
+  return forces;
+}
+
 template <class Objects>
 bool anyTouches(const Objects& objects)
 {
@@ -302,14 +310,13 @@ const Eigen::Matrix3Xd& World::pinForces(int cloth) const
 
 Eigen::Matrix3Xd World::rodContactForces(int rod) const
 {
-  const Eigen::Matrix3Xd forces = impl_->islands->rodContactForces(impl_->rods.at(rod));
-  return forces.cols() > 0 ? forces : Eigen::Matrix3Xd::Zero(3, impl_->model.rods[rod].model->nodes());
+  return orZero(impl_->islands->rodContactForces(impl_->rods.at(rod)), impl_->model.rods[rod].model->nodes());
 }
 
 Eigen::Matrix3Xd World::clothContactForces(int cloth) const
 {
   const auto& place = impl_->cloths.at(cloth);
-  return place.group->clothContactForces(place.index);
+  return orZero(place.group->clothContactForces(place.index), impl_->model.cloths[cloth].model->vertices());
 }
 
 ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const

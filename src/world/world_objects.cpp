@@ -29,10 +29,7 @@ WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
 
 bool refuseInput(const std::string& what, StepReport& report)
 {
-  report = StepReport();
-  report.ok = false;
-  report.failure = StepFailure::input_not_finite;
-  report.message = what + " is not finite or not valid; correct this input";
+  report = StepReport().refuse(StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
   return false;
 }
 

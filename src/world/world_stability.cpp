@@ -4,7 +4,8 @@
 #include <functional>
 #include <limits>
 
-#include "rod/statics_advice.h"
+#include "dynamics/statics_advice.h"
+#include "slender_sim/dynamics/lowest_eigenvalue.h"
 #include "world_statics.h"
 
 namespace slender {
@@ -44,7 +45,7 @@ RodEvaluation WorldStatics::energyAt(double s)
     RodSystem& chain = rod.stepper->system;
     for (int i = 0; i < chain.nodes(); ++i)
       chain.setInertia(i, chain.isMoving(i) ? s * rod.stepper->model->mass[i] : 0.0, chain.position(i),
-                       rod.stepper->load(rod.inputs, i));
+                       rod.stepper->load(i));
   }
   for (const BodyObject& body : objects_.bodies)
     body.part->system.hold(s, inputs_->gravity);
@@ -90,14 +91,10 @@ double WorldStatics::neutralBand() const
 /// The direction becomes the mode of the lowest eigenvalue, by inverse iteration with the matrix last factored.
 void WorldStatics::findLowestMode()
 {
-  // a start without a symmetry that a mode could be orthogonal to
-  const auto start = [](std::size_t k) {
-    return std::sin(1.0 + 1.7 * static_cast<double>(k)) + 0.5 * std::cos(0.3 * static_cast<double>(k));
-  };
   SharedMatrix& matrix = system().matrix();
   Eigen::Map<Eigen::VectorXd> shared(matrix.solution(), matrix.unknowns());
   for (Eigen::Index k = 0; k < shared.size(); ++k)
-    shared[k] = start(static_cast<std::size_t>(k));
+    shared[k] = startOfMode(static_cast<double>(k));
   std::vector<Eigen::Map<Eigen::VectorXd>> own;   // of the parts that solve on their own, each with
   std::vector<std::function<void()>> solve;       // its solution
   for (const RodObject& rod : objects_.rods)
@@ -106,7 +103,7 @@ void WorldStatics::findLowestMode()
       RodSystem& chain = rod.stepper->system;
       own.emplace_back(chain.direction(), 4 * chain.nodes());
       for (int u = 0; u < 4 * chain.nodes(); ++u)
-        own.back()[u] = rod.part->isUnknown(u) ? start(static_cast<std::size_t>(u)) : 0.0;
+        own.back()[u] = rod.part->isUnknown(u) ? startOfMode(u) : 0.0;
       solve.emplace_back([&chain] { chain.solveFor(chain.direction()); });
     }
   for (const BodyObject& body : objects_.bodies)
@@ -115,7 +112,7 @@ void WorldStatics::findLowestMode()
       BodyPart& part = *body.part;
       own.emplace_back(part.direction.data(), 6);
       for (int u = 0; u < 6; ++u)
-        own.back()[u] = start(static_cast<std::size_t>(u));
+        own.back()[u] = startOfMode(u);
       solve.emplace_back([&part] { part.solveFor(part.direction); });
     }
   for (int k = 0; k < 12; ++k)

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "rod/statics_advice.h"
+#include "dynamics/statics_advice.h"
 #include "slender_sim/dynamics/lowest_eigenvalue.h"
 #include "slender_sim/geometry/rotation.h"
 
@@ -49,13 +49,10 @@ void standStill(WorldState& state)
 
 StepReport refuseTorques()
 {
-  StepReport report;
-  report.ok = false;
-  report.failure = StepFailure::input_not_finite;
-  report.message =
+  return StepReport().refuse(
+      StepFailure::input_not_finite,
       "statics of rods with contact or bodies does not know torques about the tangent: weld a body with this torque, "
-      "or let the scene settle by time stepping with damping (start: as_given)";
-  return report;
+      "or let the scene settle by time stepping with damping (start: as_given)");
 }
 
 }   // namespace
@@ -120,10 +117,7 @@ void WorldStatics::restore(const Configuration& c)
 void WorldStatics::load(double duration)
 {
   for (RodObject& rod : objects_.rods)
-  {
-    rod.stepper->begin(work_.rods[rod.index]);
-    rod.part->begin(rod.inputs, duration);
-  }
+    rod.stepper->begin(work_.rods[rod.index], rod.inputs, duration);
   for (const BodyObject& body : objects_.bodies)
     body.part->begin(work_.bodies[body.index], inputs_->gravity);
   island_.begin(work_, *inputs_);
@@ -265,11 +259,7 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
       origin_.rods[r].stepper->wrenches = objects_.rods[r].stepper->wrenches;
     return report_;
   }
-  report_.ok = false;
-  report_.failure = failure_;
-  if (report_.message.empty())
-    report_.message = explainStatics(report_.failure);
-  return report_;
+  return report_.refuse(failure_, report_.message.empty() ? explainStatics(failure_) : report_.message);
 }
 
 StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs)

@@ -32,8 +32,9 @@ double bendingEnergy(const TriangleMesh& rest, const MeshTopology& t, Model mode
 {
   const PointVector points = pointsOf(x);
   if (model == Model::hinge)
-    return HingeBending(t.hinges, hingeStiffness(rest, t, coefficient), VectorXd::Zero(t.hingeCount()))
-        .energy(points.data());
+    return HingeTerm(t.hinges, hingeStiffness(rest, t, coefficient), VectorXd::Zero(t.hingeCount()))
+        .value(points.data())
+        .energy;
   PointVector y(points.size());
   return 0.5 * isometricBending(rest, t, elementOf(model), coefficient).multiply(points.data(), y.data());
 }
@@ -201,8 +202,8 @@ TEST(IsometricBending, IsTheHessianOfFlatHinges)
     const double coefficient = 0.8;
     const Eigen::Matrix3d turn = random.rotation().toRotationMatrix();
     const Vector3d normal = turn.col(2);
-    const HingeBending hinges(t.hinges, hingeStiffness(mesh, t, coefficient), VectorXd::Zero(t.hingeCount()));
-    Derivatives<HingeBending> d(hinges, static_cast<int>(mesh.vertices.cols()), t.hinges);
+    HingeTerm hinges(t.hinges, hingeStiffness(mesh, t, coefficient), VectorXd::Zero(t.hingeCount()));
+    Derivatives d(hinges, static_cast<int>(mesh.vertices.cols()));
     const MatrixXd H = d.hessian(turn * mesh.vertices, HessianKind::exact);
     const MatrixXd K = isometricBending(mesh, t, IsometricElement::nonconforming, coefficient).toEigen();
     MatrixXd expected = MatrixXd::Zero(H.rows(), H.cols());
@@ -235,11 +236,11 @@ TEST(PointMatrix, ProductsMatchDenseOnes)
     EXPECT_EQ(py[i], 0.0);
 
   // as blocks, with others beside them
-  const MembraneEnergy membrane(mesh, orthotropicMembrane(3.0, 1.2, 0.4, 0.5));
+  MembraneTerm membrane(mesh, orthotropicMembrane(3.0, 1.2, 0.4, 0.5));
   BlockMatrix blocks(K.size(), {mesh.triangles, t.hinges});
   PointVector gradient(4 * K.size(), 0.0);
-  membrane.addHessian(HessianKind::exact, pointsOf(mesh.vertices + 0.1 * x).data(), membrane.slotsIn(blocks),
-                      gradient.data(), blocks.values());
+  membrane.setPattern(blocks);
+  membrane.addHessian(HessianKind::exact, pointsOf(mesh.vertices + 0.1 * x).data(), gradient.data(), blocks.values());
   const MatrixXd before = denseOf(blocks);
   EXPECT_LT((before - before.transpose()).norm(), 1e-14 * before.norm());
   blocks.add(0.5, K, blocks.mapOf(K));

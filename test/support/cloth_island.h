@@ -104,8 +104,7 @@ public:
     for (Rod& rod : rods)
     {
       rod.inputs.gravity = gravity;
-      rod.stepper->begin(rod.state);
-      rod.part->begin(rod.inputs, step_);
+      rod.stepper->begin(rod.state, rod.inputs, step_);
     }
     for (Cloth& cloth : cloths)
     {

@@ -3,9 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SparseCore>
 
-#include "slender_sim/energy/hinge.h"
+#include "slender_sim/energy/hinge_term.h"
 #include "slender_sim/energy/isometric_bending.h"
-#include "slender_sim/energy/membrane.h"
+#include "slender_sim/energy/membrane_term.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/geometry/mesh_topology.h"
 #include "test/support/random.h"
@@ -46,22 +46,13 @@ inline MatrixXd denseOf(const BlockMatrix& m)
   return a;
 }
 
-/// Energy, gradient (3 x n) and Hessian of a HingeBending or MembraneEnergy.
-template <class Energy>
+/// Gradient (3 x n) and Hessian of a term.
 struct Derivatives
 {
-  const Energy& energy;
-  Eigen::MatrixXi elements;
+  PointTerm& energy;
   BlockMatrix matrix;
-  std::vector<int> slots;
 
-  Derivatives(const Energy& e, int points, const Eigen::MatrixXi& of)
-    : energy(e),
-      elements(of),
-      matrix(points, {of}),
-      slots(e.slotsIn(matrix))
-  {
-  }
+  Derivatives(PointTerm& e, int points) : energy(e), matrix(points, {e.elements()}) { energy.setPattern(matrix); }
 
   Matrix3Xd gradient(const Matrix3Xd& x)
   {
@@ -69,13 +60,13 @@ struct Derivatives
     energy.addGradient(pointsOf(x).data(), g.data());
     return matrixOf(g);
   }
-  /// `from`: further arguments of addHessian(), see MembraneEnergy.
-  template <class... From>
-  MatrixXd hessian(const Matrix3Xd& x, HessianKind kind, const From&... from)
+  /// `from`: see PointTerm::addHessian(); without columns: null.
+  MatrixXd hessian(const Matrix3Xd& x, HessianKind kind, const Matrix3Xd& from = Matrix3Xd())
   {
     matrix.setZero();
     PointVector g(4 * x.cols(), 0.0);
-    energy.addHessian(kind, pointsOf(x).data(), slots, g.data(), matrix.values(), pointsOf(from).data()...);
+    energy.addHessian(kind, pointsOf(x).data(), g.data(), matrix.values(),
+                      from.cols() ? pointsOf(from).data() : nullptr);
     return denseOf(matrix);
   }
 };

@@ -36,7 +36,7 @@ Matrix3Xd rolled(const ClothModel& model, double radius)
 VectorXd anglesOf(const ClothModel& model, const Matrix3Xd& x)
 {
   const VectorXd none = VectorXd::Zero(model.topology.hingeCount());
-  const HingeBending hinges(model.topology.hinges, none, none);
+  const HingeTerm hinges(model.topology.hinges, none, none);
   VectorXd angles(hinges.paddedCount());
   hinges.angles(pointsOf(x).data(), angles.data());
   return angles.head(hinges.count());

@@ -22,7 +22,7 @@ TriangleMesh latticeOf(GridPattern pattern, int cells)
 double energyOfAngles(const std::vector<PlateTriangle>& triangles, const MeshTopology& t, const Matrix3Xd& x)
 {
   const VectorXd none = VectorXd::Zero(t.hingeCount());
-  const HingeBending hinges(t.hinges, none, none);
+  const HingeTerm hinges(t.hinges, none, none);
   VectorXd angles(hinges.paddedCount());
   hinges.angles(pointsOf(x).data(), angles.data());
   double energy = 0;

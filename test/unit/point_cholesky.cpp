@@ -23,14 +23,14 @@ struct System
   explicit System(int cells = 12, double bends = 1.0, double inertia = 0.5)
     : mesh(gridMesh(1.0, 1.0, cells, 0, GridPattern::irregular))
   {
-    const MembraneEnergy membrane(mesh, orthotropicMembrane(3.0, 1.2, 0.4, 0.5));
+    MembraneTerm membrane(mesh, orthotropicMembrane(3.0, 1.2, 0.4, 0.5));
     PointVector gradient(4 * points(), 0.0);
     Random random(23);
     Matrix3Xd x = mesh.vertices;
     for (int i = 0; i < points(); ++i)
       x.col(i) += random.vector(0.24 / cells);
-    membrane.addHessian(HessianKind::semidefinite, pointsOf(x).data(), membrane.slotsIn(blocks), gradient.data(),
-                        blocks.values());
+    membrane.setPattern(blocks);
+    membrane.addHessian(HessianKind::semidefinite, pointsOf(x).data(), gradient.data(), blocks.values());
     blocks.add(bends, bending, blocks.mapOf(bending));
     std::vector<Eigen::Triplet<double>> mass;
     for (int i = 0; i < points(); ++i)

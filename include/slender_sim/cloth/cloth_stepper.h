@@ -120,8 +120,11 @@ public:
   ClothSolver solver() const;
   const ClothModel& model() const;
 
-private:
+  /// For the world, which steps its objects together.
   class Impl;
+  Impl& impl() { return *impl_; }
+
+private:
   std::unique_ptr<Impl> impl_;
 };
 

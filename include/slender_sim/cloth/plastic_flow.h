@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "slender_sim/cloth/cloth_model.h"
-#include "slender_sim/energy/hinge.h"
+#include "slender_sim/energy/hinge_term.h"
 
 namespace slender {
 
@@ -26,8 +26,8 @@ public:
 
 private:
   Plasticity law_;
-  std::unique_ptr<HingeBending> hinges_;   ///< for their angles
-  Eigen::VectorXd width_;                  ///< 2A / e [m]
+  std::unique_ptr<HingeTerm> hinges_;   ///< for their angles
+  Eigen::VectorXd width_;               ///< 2A / e [m]
   PointVector x_;
   AlignedVector<double> angles_;
 };

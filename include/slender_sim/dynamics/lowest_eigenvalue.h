@@ -12,6 +12,9 @@ struct LowestEigenvalue
   double shift = 0.0;   ///< K + shift M is positive definite, and close to singular: what inverse iteration factors
 };
 
+/// Component k of the start of an inverse iteration, which has no symmetry that a mode could be orthogonal to.
+inline double startOfMode(double k) { return std::sin(1.0 + 1.7 * k) + 0.5 * std::cos(0.3 * k); }
+
 /// Finds the lowest eigenvalue by bisection. `definite(s)` factors K + s M and returns whether it is positive definite;
 /// s may be negative. By Sylvester's law of inertia K + s M is definite exactly when the lowest eigenvalue is above -s,
 /// so that no start vector can miss a mode. Eigenvalues of size `neutral` (> 0) or less count as zero. Returns minus

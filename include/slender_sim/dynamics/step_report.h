@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "slender_sim/dynamics/failure_place.h"
 
@@ -65,6 +66,14 @@ struct StepReport
 
   /// Takes the other report into this one (sums, maxima, first failure wins).
   void merge(const StepReport& other);
+  /// Makes this the report of a step that failed, and returns it.
+  StepReport& refuse(StepFailure why, std::string text)
+  {
+    ok = false;
+    failure = why;
+    message = std::move(text);
+    return *this;
+  }
 };
 
 const char* toString(StepFailure failure);

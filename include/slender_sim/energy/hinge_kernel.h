@@ -26,7 +26,7 @@ struct HingeKernels
   /// Adds dE/dx and the second derivatives to the blocks of a matrix (10 slots per hinge, see BlockMatrix::slots);
   /// returns E.
   double (*hessian)(const HingeArrays& hinges, const double* x, const int* slots, double* gradient, double* values);
-  /// The same with a positive semidefinite matrix not below the exact one (see HingeBending).
+  /// The same with a positive semidefinite matrix not below the exact one (see HingeTerm).
   double (*semidefiniteHessian)(const HingeArrays& hinges, const double* x, const int* slots, double* gradient,
                                 double* values);
 };

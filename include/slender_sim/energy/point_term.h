@@ -4,12 +4,17 @@
 
 #include <Eigen/Core>
 
-#include "slender_sim/energy/hinge.h"
 #include "slender_sim/linalg/block_matrix.h"
 
 /// Energies and loads of parts that consist of points. Calls are virtual, one per term and evaluation; loops over
 /// elements lie inside. Points have 4 doubles (see PointVector). Terms may use work space: one thread at a time.
 namespace slender {
+
+enum class HessianKind
+{
+  exact,
+  semidefinite   ///< positive semidefinite and not below the exact one, so that a Newton step descends
+};
 
 /// The group of a term. Reports sum the energies of a group, and preconditioners its constant matrices.
 enum class TermAccount

@@ -65,9 +65,9 @@ public:
   RodStepper* rodStepper(int rod);
 
   const Eigen::Matrix3Xd& pinForces(int cloth) const;   ///< as ClothStepper::pinForces()
-  /// As ClothGroup::contactForces(); without columns for a cloth that touches nothing.
+  /// Forces of contact on the vertices of a cloth in the last step (3 x vertices [N]); zero if it touches nothing.
   Eigen::Matrix3Xd clothContactForces(int cloth) const;
-  /// Forces of contact on the nodes of a rod in the last step (3 x nodes [N]).
+  /// The same on the nodes of a rod (3 x nodes [N]).
   Eigen::Matrix3Xd rodContactForces(int rod) const;
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const;
 

@@ -17,30 +17,6 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 constexpr double kFewPerTurn = 10.0;   // edges: with fewer, frequencies of coils err by more than about 5 %
 constexpr double kWideStep = 0.3;      // [rad] of a coil in a step: implicit Euler then errs by about 5 % in frequency
 
-double distanceTo(const ObstacleConfig& obstacle, const Eigen::Vector3d& point)
-{
-  const Eigen::Vector3d p = obstacle.pose.inverse() * point;
-  if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleMesh>>(&obstacle.shape))
-  {
-    double least = kUnknown;
-    for (Eigen::Index f = 0; *mesh && f < (*mesh)->triangles.cols(); ++f)
-    {
-      const Eigen::Vector3i t = (*mesh)->triangles.col(f);
-      const Triangle triangle{(*mesh)->vertices.col(t[0]), (*mesh)->vertices.col(t[1]), (*mesh)->vertices.col(t[2])};
-      least = std::min(least, pieceDistance(triangle, p, Eigen::Vector3d::UnitX()).distance);
-    }
-    return least;
-  }
-  return std::visit(
-      [&](const auto& shape) {
-        if constexpr (std::is_constructible_v<ConvexPiece, decltype(shape)>)
-          return pieceDistance(ConvexPiece(shape), p, Eigen::Vector3d::UnitX()).distance;
-        else
-          return kUnknown;
-      },
-      obstacle.shape);
-}
-
 /// From the nozzle straight down to the first obstacle, infinite when there is none below.
 double fallOnto(const std::vector<ObstacleConfig>& obstacles, const Eigen::Vector3d& from, const Eigen::Vector3d& down)
 {
@@ -49,8 +25,9 @@ double fallOnto(const std::vector<ObstacleConfig>& obstacles, const Eigen::Vecto
   for (int k = 0; k < 200 && fallen < kFar; ++k)
   {
     double nearest = kUnknown;
+    const Eigen::Vector3d at = from + fallen * down;
     for (const ObstacleConfig& obstacle : obstacles)
-      nearest = std::min(nearest, distanceTo(obstacle, from + fallen * down));
+      nearest = std::min(nearest, distanceToShape(obstacle.shape, obstacle.pose, at, at));
     if (nearest < 1e-6 + 1e-4 * fallen)
       return fallen;
     fallen += nearest;

@@ -95,12 +95,9 @@ void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordF
 {
   if (!asks(fields, RecordField::contact_force))
     return;
-  const Eigen::Index vertices = simulation.state().cloths[static_cast<std::size_t>(cloth)].x.cols();
-  Columns columns("cloth_fields", simulation.clothModel(cloth).name, vertices);
-  Eigen::Matrix3Xd forces = simulation.world().clothContactForces(cloth);
-  if (forces.cols() != vertices)
-    forces.setZero(3, vertices);   // it touches nothing, or has not been stepped yet
-  columns.add(contact_columns, forces);
+  const ClothModel& model = simulation.clothModel(cloth);
+  Columns columns("cloth_fields", model.name, model.vertices());
+  columns.add(contact_columns, simulation.world().clothContactForces(cloth));
   columns.moveTo(out);
 }
 

@@ -19,12 +19,7 @@ double largestDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b)
   return (a - b).colwise().norm().maxCoeff();
 }
 
-void fail(StaticsRun& run, const std::string& message)
-{
-  run.end.ok = false;
-  run.end.failure = StepFailure::newton_diverged;
-  run.end.message = message;
-}
+void fail(StaticsRun& run, const std::string& message) { run.end.refuse(StepFailure::newton_diverged, message); }
 
 /// Sum of the sizes of all loads, torques as forces at the end of the rod [N].
 double sumOfLoads(const RodModel& model, const RodInputs& loads)

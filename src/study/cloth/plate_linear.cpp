@@ -6,7 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 
-#include "slender_sim/energy/hinge.h"
+#include "slender_sim/energy/hinge_term.h"
+#include "slender_sim/energy/membrane_term.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
@@ -86,8 +87,9 @@ double plateEnergy(const TriangleMesh& rest, const MeshTopology& t, BendingModel
   PointVector points, product(4 * x.cols());
   toPoints(x, points);
   if (model == BendingModel::hinge)
-    return HingeBending(t.hinges, hingeStiffness(rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()))
-        .energy(points.data());
+    return HingeTerm(t.hinges, hingeStiffness(rest, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()))
+        .value(points.data())
+        .energy;
   return 0.5 * isometricBending(rest, t, elementOf(model), coefficient).multiply(points.data(), product.data());
 }
 
@@ -97,12 +99,13 @@ Sparse plateStiffness(const TriangleMesh& mesh, BendingModel model)
   const double coefficient = bendingCalibration(mesh, t, elementOf(model), Eigen::Vector3d::UnitX());
   if (model != BendingModel::hinge)
     return isometricBending(mesh, t, elementOf(model), coefficient).toEigen();
-  const HingeBending hinges(t.hinges, hingeStiffness(mesh, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
+  HingeTerm hinges(t.hinges, hingeStiffness(mesh, t, coefficient), Eigen::VectorXd::Zero(t.hingeCount()));
   BlockMatrix matrix(static_cast<int>(mesh.vertices.cols()), {t.hinges});
   PointVector x, gradient(4 * mesh.vertices.cols(), 0.0);
   toPoints(mesh.vertices, x);
   matrix.setZero();
-  hinges.addHessian(HessianKind::exact, x.data(), hinges.slotsIn(matrix), gradient.data(), matrix.values());
+  hinges.setPattern(matrix);
+  hinges.addHessian(HessianKind::exact, x.data(), gradient.data(), matrix.values());
   return normalPart(matrix);
 }
 
@@ -146,13 +149,13 @@ double lateralBucklingLoad(GridPattern pattern, const PlateModel& model, double 
   const Eigen::VectorXd areas = vertexAreas(mesh);
 
   // In-plane displacements under a unit load per area, for c11 = 1
-  const MembraneEnergy membrane(mesh, isotropicMembrane(1.0 - 0.09, 0.3, 1.0));
+  MembraneTerm membrane(mesh, isotropicMembrane(1.0 - 0.09, 0.3, 1.0));
   BlockMatrix matrix(n, {mesh.triangles});
-  const std::vector<int> slots = membrane.slotsIn(matrix);
+  membrane.setPattern(matrix);
   PointVector x, gradient(4 * n, 0.0), u(4 * n, 0.0);
   toPoints(mesh.vertices, x);
   matrix.setZero();
-  membrane.addHessian(HessianKind::exact, x.data(), slots, gradient.data(), matrix.values());
+  membrane.addHessian(HessianKind::exact, x.data(), gradient.data(), matrix.values());
   for (int j = 0; j < n; ++j)
     matrix.values()[9 * static_cast<long>(matrix.starts()[j]) + 8] = 1.0;   // nothing holds the normal direction
   std::vector<char> fixed(n, 0);
@@ -171,7 +174,7 @@ double lateralBucklingLoad(GridPattern pattern, const PlateModel& model, double 
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] += kSmall * u[i];
   matrix.setZero();
-  membrane.addHessian(HessianKind::exact, x.data(), slots, gradient.data(), matrix.values());
+  membrane.addHessian(HessianKind::exact, x.data(), gradient.data(), matrix.values());
   const Free free(n, held);
   const Sparse geometric = free.of(normalPart(matrix)) / kSmall, stiffness = free.of(model(mesh));
   const Eigen::SimplicialLDLT<Sparse> solver(stiffness);

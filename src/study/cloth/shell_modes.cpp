@@ -7,7 +7,8 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "slender_sim/energy/hinge.h"
+#include "slender_sim/energy/hinge_term.h"
+#include "slender_sim/energy/membrane_term.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
@@ -140,19 +141,20 @@ VectorXd capHarmonic(const ShellMaterial& material, double radius, double angle,
 BlockMatrix elasticHessian(const ClothModel& model, const ClothState& state)
 {
   const MeshTopology& t = model.topology;
-  const MembraneEnergy membrane(model.rest, model.membrane, model.warp);
+  MembraneTerm membrane(model.rest, model.membrane, model.warp);
   const double coefficient =
       model.bending_modulus * bendingCalibration(model.rest, t, IsometricElement::nonconforming, model.warp);
   BlockMatrix matrix(model.vertices(), {model.rest.triangles, t.hinges});
   PointVector x, gradient(4 * static_cast<std::size_t>(model.vertices()), 0.0);
   toPoints(state.x, x);
   matrix.setZero();
-  membrane.addHessian(HessianKind::exact, x.data(), membrane.slotsIn(matrix), gradient.data(), matrix.values());
+  membrane.setPattern(matrix);
+  membrane.addHessian(HessianKind::exact, x.data(), gradient.data(), matrix.values());
   if (model.bending == BendingModel::hinge)
   {
-    const HingeBending hinges(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces),
-                              state.rest_angles);
-    hinges.addHessian(HessianKind::exact, x.data(), hinges.slotsIn(matrix), gradient.data(), matrix.values());
+    HingeTerm hinges(t.hinges, hingeStiffness(model.rest, t, coefficient, model.clamped_faces), state.rest_angles);
+    hinges.setPattern(matrix);
+    hinges.addHessian(HessianKind::exact, x.data(), gradient.data(), matrix.values());
     return matrix;
   }
   if (model.bending != BendingModel::isometric_nonconforming || model.bending_poissons_ratio)

@@ -13,6 +13,7 @@
 #include <Eigen/LU>
 
 #include "study/cloth/cloth_cases.h"
+#include "slender_sim/energy/hinge_term.h"
 #include "slender_sim/energy/isometric_bending.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/point_kernel.h"
@@ -221,7 +222,7 @@ struct BendingCosts
 
 /// Difference of the two models' gradients where the mesh is bent a little, over the gradient's norm. Isometric bending
 /// is the small-angle limit of these hinges, so the difference is of the order of the slope.
-double gradientDifference(const TriangleMesh& mesh, const HingeBending& hinges, const PointMatrix& matrix)
+double gradientDifference(const TriangleMesh& mesh, HingeTerm& hinges, const PointMatrix& matrix)
 {
   Eigen::Matrix3Xd bent = mesh.vertices;
   for (int i = 0; i < bent.cols(); ++i)
@@ -267,10 +268,10 @@ BendingCosts measureBending(const TriangleMesh& mesh, bool flag)
                    }) /
       kStepsShared;
   const double coefficient = 1e-4 * bendingCalibration(mesh, t, element, Eigen::Vector3d::UnitX());
-  const HingeBending hinges(t.hinges, hingeStiffness(mesh, t, coefficient), hinged.state.rest_angles);
+  HingeTerm hinges(t.hinges, hingeStiffness(mesh, t, coefficient), hinged.state.rest_angles);
   costs.small_bend_difference = gradientDifference(mesh, hinges, matrix);
   BlockMatrix blocks(n, {t.hinges});
-  const std::vector<int> slots = hinges.slotsIn(blocks);
+  hinges.setPattern(blocks);
   PointVector x, gradient(4 * n, 0.0);
   toPoints(isometric.state.x, x);
   for (double& cost : costs.gradient)
@@ -282,11 +283,10 @@ BendingCosts measureBending(const TriangleMesh& mesh, bool flag)
         std::min(costs.gradient[0], leastSeconds(0.02, [&] { hinges.addGradient(x.data(), gradient.data()); }));
     costs.gradient[1] =
         std::min(costs.gradient[1], leastSeconds(0.02, [&] { matrix.addProduct(1.0, x.data(), gradient.data()); }));
-    costs.hessian[0] =
-        std::min(costs.hessian[0], leastSeconds(0.02, [&] {
-                   blocks.setZero();
-                   hinges.addHessian(HessianKind::exact, x.data(), slots, gradient.data(), blocks.values());
-                 }));
+    costs.hessian[0] = std::min(costs.hessian[0], leastSeconds(0.02, [&] {
+                                  blocks.setZero();
+                                  hinges.addHessian(HessianKind::exact, x.data(), gradient.data(), blocks.values());
+                                }));
   }
   costs.product_over_bound = costs.gradient[1] / readSeconds(matrix.bytes());
 

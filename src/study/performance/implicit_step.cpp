@@ -6,6 +6,7 @@
 
 #include "study/cloth/cloth_cases.h"
 #include "slender_sim/energy/isometric_bending.h"
+#include "slender_sim/energy/membrane_term.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "slender_sim/study/study.h"
 #include "cloth/cloth_linear_solver.h"
@@ -47,11 +48,12 @@ double factorSeconds(const ClothSetup& cloth, double budget)
   const PointMatrix bending = isometricBending(
       model.rest, t, element, model.bending_modulus * bendingCalibration(model.rest, t, element, model.warp));
   BlockMatrix matrix(n, {model.rest.triangles, t.hinges});
-  const MembraneEnergy membrane(model.rest, model.membrane, model.warp);
+  MembraneTerm membrane(model.rest, model.membrane, model.warp);
   PointVector x, gradient(4 * n, 0.0);
   toPoints(cloth.state.x, x);
   matrix.setZero();
-  membrane.addHessian(HessianKind::semidefinite, x.data(), membrane.slotsIn(matrix), gradient.data(), matrix.values());
+  membrane.setPattern(matrix);
+  membrane.addHessian(HessianKind::semidefinite, x.data(), gradient.data(), matrix.values());
   matrix.add(1.0, bending, matrix.mapOf(bending));
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k)
