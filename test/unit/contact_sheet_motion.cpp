@@ -214,6 +214,23 @@ TEST(ContactSheetMotion, TermsDependOnTheConfigurationOnly)
 }
 
 /// Cloth that falls as a whole has no candidates, but what it falls on is found.
+/// Pieces that are new since the last step know again what presses on their held points.
+TEST(ContactSheetMotion, WhatPressesOnHeldPointsMeetsNoNewPiece)
+{
+  Scene s;
+  s.addCloth(gridMesh(0.3, 0.3, 3, 3, GridPattern::alternating), Vector::Zero(), Eigen::Quaterniond::Identity());
+  const int held = 5;
+  s.addSolid(Sphere{0.02}, {s.x.col(held), Eigen::Quaterniond::Identity()});
+  ContactPotential potential = s.potential();
+  EXPECT_FALSE(potential.thinToFit(s.x, s.solids));
+  for (ContactTriangle& t : s.surface.triangles)
+    for (int k = 0; k < 3; ++k)
+      if (t.corner[k] == held)
+        t.driven = static_cast<unsigned char>(t.driven | 1 << k);
+  potential.setPieces(s.surface);
+  EXPECT_TRUE(potential.thinToFit(s.x, s.solids));
+}
+
 TEST(ContactSheetMotion, FallsOntoATable)
 {
   Scene s;
