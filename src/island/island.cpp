@@ -301,6 +301,9 @@ StepFailure Island::attempt(const Substep& substep, StepReport& report)
       isExplicit(time_.integrator) ? stepExplicitly(substep, report) : solveSubstep(substep, report);
   if (solved != StepFailure::none)
     return solved;
+  if (ContactPotential* contact = equations_.contact();
+      contact && substep.may_halve && contact->passedSheet(equations_.startPoints(), equations_.startSolids()))
+    return StepFailure::passed_sheet;
   if (conserving_ && energyAtEnd() > most_energy_)
     return StepFailure::energy_grew;
   if (ContactPotential* contact = equations_.contact())
@@ -333,6 +336,8 @@ void Island::accept(const Substep& substep)
 
 bool Island::shorterMayHelp(StepFailure failure) const
 {
+  if (failure == StepFailure::passed_sheet)
+    return true;
   return !isExplicit(time_.integrator) && (failed_ >= parts_.size() || parts_[failed_]->shorterMayHelp(failure));
 }
 

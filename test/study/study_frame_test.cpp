@@ -58,6 +58,19 @@ TEST(StudyFrame, onlyTheChosenScenesOfASafetyStudyRun)
   EXPECT_EQ(metric(context, "scenes"), 1.0);
 }
 
+/// In these scenes a ball presses on held corners while threads divide (417), a rope folds (469), and things that are
+/// thrown got around the rim of a sheet in one step (772, 881).
+TEST(StudyFrame, scenesWithFoldsAndRimsHold)
+{
+  const Study* study = findStudy("coupled_safety");
+  ASSERT_TRUE(study);
+  StudyContext context(study->name, true, false);
+  context.choose({417, 469, 772, 881});
+  study->run(context);
+  for (const char* name : {"penetrations", "thickness_violations", "refused"})
+    EXPECT_EQ(metric(context, name), 0.0) << name;
+}
+
 TEST(StudyFrame, aCheckWithoutANumberIsNoSuccess)
 {
   StudyContext context("frame", true, false);
