@@ -61,6 +61,7 @@ public:
   void keepSprings(const std::vector<Pose>& poses);
   void letPass(const SurfaceMotion& motion);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  bool passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
   void setPieces(const ContactSurface& pieces);
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
@@ -82,6 +83,14 @@ public:
   bool following = false;   ///< see followFriction()
 
 private:
+  /// How the points of an object have moved since begin() [m].
+  struct Displacements
+  {
+    BoundingBox box = BoundingBox::empty();
+    double shortest_edge = std::numeric_limits<double>::infinity();   ///< of its triangles [m]; infinite without any
+  };
+  void takeDisplacements(const Eigen::Matrix3Xd& x_end);
+  bool movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
   double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
   double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const std::vector<Pose>& poses,
                     bool with_stiffness);
@@ -173,7 +182,8 @@ private:
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;
-  std::vector<int> segment_of_point_;   ///< begins at a point, or ends there if none begins; -1: none
+  std::vector<Displacements> displacements_;   ///< per object, see movedFar()
+  std::vector<int> segment_of_point_;          ///< begins at a point, or ends there if none begins; -1: none
   double margin_;
   std::vector<int> order_;   ///< for clearance()
   std::vector<BoundingBox> boxes_;

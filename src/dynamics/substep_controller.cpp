@@ -38,7 +38,7 @@ void SubstepController::run(SubstepEquations& equations, double duration, StepRe
     // worse.
     const bool last = t + h > duration * (1 - kLengthRounding);
     const double length = last ? duration - t : h;
-    const Substep substep{t, last ? duration : t + length, length};
+    const Substep substep{t, last ? duration : t + length, length, mayHalve(length, cuts)};
     StepReport result;
     const StepFailure failure = equations.attempt(substep, result);
     const bool failed = failure != StepFailure::none;

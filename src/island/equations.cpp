@@ -177,17 +177,20 @@ void Equations::endStage()
   turns_base_ = turns_begin_ + turns_;
 }
 
-/// Goes from the base towards the trial, as far as nothing touches. Where nothing moves as prescribed, the trial that
-/// was reached is the start of the solution. Otherwise what is prescribed has to wait there until all else gave way.
+/// Goes from the base towards the trial, as far as nothing touches and no curve is folded. Where nothing moves as
+/// prescribed, the trial that was reached is the start of the solution. Otherwise what is prescribed has to wait there
+/// until all else gave way.
 Approach Equations::approach(double from, double to, double& reached)
 {
+  constexpr int kMostRetreats = 20;   // each by half
   gather(points_end_, poses_end_);
   double alpha = contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
   const bool held_moves =
       std::any_of(parts_.begin(), parts_.end(), [&](const Part* part) { return part->heldMoves(from, to); });
   const bool moving = held_moves || (from < to && solidsMove());
   reached = to;
-  for (int attempt = 0; attempt < 20; ++attempt, alpha *= 0.5)
+  bool only_folded = false;
+  for (int attempt = 0; attempt < kMostRetreats; ++attempt, alpha *= 0.5)
   {
     if (alpha < 1.0)
     {
@@ -206,10 +209,10 @@ Approach Equations::approach(double from, double to, double& reached)
       accept();
       return moving && alpha < 1.0 ? Approach::partly : Approach::arrived;
     }
-    if (alpha == 1.0 && trial.min_chi <= kFoldedChi && std::isfinite(trial.potential))
-      return Approach::arrived;   // Contact is not what is wrong. minimize() says so.
+    only_folded = trial.min_chi <= kFoldedChi && std::isfinite(trial.potential);
   }
-  return Approach::squeezed;
+  // If contact is not what is wrong, minimize() says what is.
+  return only_folded ? Approach::arrived : Approach::squeezed;
 }
 
 double Equations::roomToTrial()

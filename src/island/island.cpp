@@ -301,12 +301,18 @@ StepFailure Island::attempt(const Substep& substep, StepReport& report)
       isExplicit(time_.integrator) ? stepExplicitly(substep, report) : solveSubstep(substep, report);
   if (solved != StepFailure::none)
     return solved;
+  if (ContactPotential* contact = equations_.contact();
+      contact && substep.may_halve && contact->passedSheet(equations_.startPoints(), equations_.startSolids()))
+    return StepFailure::passed_sheet;
   if (conserving_ && energyAtEnd() > most_energy_)
     return StepFailure::energy_grew;
   if (ContactPotential* contact = equations_.contact())
     contact->adaptStiffness();
   for (failed_ = 0; failed_ < parts_.size(); ++failed_)
     if (const StepFailure failure = parts_[failed_]->finishSubstep(report); failure != StepFailure::none)
+      return failure;
+  for (failed_ = 0; failed_ < parts_.size(); ++failed_)
+    if (const StepFailure failure = parts_[failed_]->changeMesh(); failure != StepFailure::none)
       return failure;
   failed_ = 0;
   return StepFailure::none;
@@ -330,15 +336,23 @@ void Island::accept(const Substep& substep)
 
 bool Island::shorterMayHelp(StepFailure failure) const
 {
+  if (failure == StepFailure::passed_sheet)
+    return true;
   return !isExplicit(time_.integrator) && (failed_ >= parts_.size() || parts_[failed_]->shorterMayHelp(failure));
 }
 
+/// Takes out a fold of the part that is folded most. A part that is merely bent may fail only because of it.
 bool Island::mend(StepReport& report)
 {
   constexpr int kMostFolds = 20;   // in one step
   if (report.mended_folds >= kMostFolds)
     return false;
+  folded_.clear();
   for (Part* part : parts_)
+    if (const double fold = part->sharpestFold(); fold < 1.0)
+      folded_.emplace_back(fold, part);
+  std::stable_sort(folded_.begin(), folded_.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (const auto& [fold, part] : folded_)
     if (part->mend())
     {
       ++report.mended_folds;

@@ -83,9 +83,10 @@ private:
   bool surface_changes_ = false;
   StepPlan plan_;
   double duration_ = 0.0, gap_ = 0.0;
-  bool conserving_ = false;    ///< the present step may not add to the energy
-  double most_energy_ = 0.0;   ///< of a step that conserves [J]
-  std::size_t failed_ = 0;     ///< part that the last failure is about
+  bool conserving_ = false;                        ///< the present step may not add to the energy
+  double most_energy_ = 0.0;                       ///< of a step that conserves [J]
+  std::size_t failed_ = 0;                         ///< part that the last failure is about
+  std::vector<std::pair<double, Part*>> folded_;   ///< parts with a fold, see Part::sharpestFold()
 };
 
 }   // namespace slender

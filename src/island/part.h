@@ -188,6 +188,8 @@ public:
   virtual void endStage(std::size_t, bool, StepReport&) {}
   /// After the last stage of all parts. What a part changes here is not taken back.
   virtual StepFailure finishSubstep(StepReport&) { return StepFailure::none; }
+  /// After finishSubstep() of all parts: changes its mesh, for which it looks at where the other parts are.
+  virtual StepFailure changeMesh() { return StepFailure::none; }
   /// Takes the end of the substep as the present state.
   virtual void acceptSubstep(const Substep& substep) = 0;
 
@@ -216,6 +218,8 @@ public:
   virtual StepFailure givesUp() const { return StepFailure::none; }
   /// Whether a shorter substep may succeed where the last one failed.
   virtual bool shorterMayHelp(StepFailure) const { return true; }
+  /// 1 + cosine of the sharpest turn in the last trial that mend() may take out: 0 at a fold, 1 or more without one.
+  virtual double sharpestFold() const { return 1.0; }
   /// Changes the present state so that longer substeps may succeed, if the part can.
   virtual bool mend() { return false; }
   /// Largest unbalanced force in the last evaluation [N].

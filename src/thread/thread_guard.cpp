@@ -49,16 +49,35 @@ bool ThreadGuard::allows(const ThreadState& state, int first, int last, const Ei
   return !strand || (forOthers(state, first, last, isFree) && forFaces(strand->contact, isOutside));
 }
 
-bool ThreadGuard::mayJoin(const ThreadState& state, int i) const
+bool ThreadGuard::hasRoom(const ThreadState& state, const Edge& edge, const Room& room) const
 {
-  const Eigen::Vector3d &a = state.x[i - 1], &b = state.x[i], &c = state.x[i + 1];
-  const double radius = std::sqrt((state.volume[i - 1] + state.volume[i]) / (M_PI * (c - a).norm()));
-  return forOthers(state, i - 1, i, [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q, double r, double core) {
-    const auto apart = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double own) {
-      return segmentDistance(from, to, p, q) / (core * (own + r));
+  // distance(from, to): to what the edge may touch, whose thickness is counted by `core`
+  const auto leaves = [&](double share, double thickness, double core, const auto& distance) {
+    const auto clear = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius) {
+      return distance(from, to) / (core * (radius + thickness));
     };
-    return apart(a, c, radius) >= std::min({1.0, apart(a, b, state.radius(i - 1)), apart(b, c, state.radius(i))});
-  });
+    double needed = share;
+    for (int j = edge.first; j <= edge.last; ++j)
+      needed = std::min(needed, clear(state.x[j], state.x[j + 1], state.radius(j)));
+    return clear(edge.from, edge.to, edge.radius) >= needed;
+  };
+  const auto fromOthers = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& q, double r, double core) {
+    return leaves(room.others, r, core, [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+      return segmentDistance(from, to, p, q);
+    });
+  };
+  const Eigen::Vector3d middle = 0.5 * (edge.from + edge.to);
+  const double half = 0.5 * (edge.to - edge.from).norm();
+  const auto fromSolids = [&](const ConvexPiece& piece, const Pose& pose, double reach, double thickness) {
+    if ((pose.position - middle).norm() > reach + half + edge.radius + thickness)
+      return true;
+    const Pose to_piece = pose.inverse();
+    return leaves(room.solids, thickness, 1.0, [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+      return segmentPieceDistance(piece, to_piece * from, to_piece * to).distance;
+    });
+  };
+  const Strand* strand = strandOf(state);
+  return !strand || (forOthers(state, edge.first, edge.last, fromOthers) && forFaces(strand->contact, fromSolids));
 }
 
 const ThreadGuard::Strand* ThreadGuard::strandOf(const ThreadState& state) const

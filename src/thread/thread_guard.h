@@ -29,7 +29,7 @@ public:
 
   bool allows(const ThreadState& state, int first, int last, const Eigen::Vector3d& from,
               const Eigen::Vector3d& to) const override;
-  bool mayJoin(const ThreadState& state, int i) const override;
+  bool hasRoom(const ThreadState& state, const Edge& edge, const Room& room) const override;
 
 private:
   const Strand* strandOf(const ThreadState& state) const;

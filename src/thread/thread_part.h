@@ -59,8 +59,10 @@ private:
   void holdMore() override;
   StepFailure predict(const Substep& substep, StepReport& report) override;
   StepFailure finishSubstep(StepReport& report) override;
+  StepFailure changeMesh() override { return thread_.changeMesh(guard_); }
   void acceptSubstep(const Substep&) override {}   // finishSubstep() changed the present state
   bool shorterMayHelp(StepFailure failure) const override;
+  double sharpestFold() const override;
   bool mend() override;
   Largest unbalancedForce() const override { return thread_.unbalancedForce(); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;

@@ -88,7 +88,11 @@ StepFailure ThreadPart::predict(const Substep& substep, StepReport&)
   return failure == StepFailure::none ? thread_.move(length_) : failure;
 }
 
-StepFailure ThreadPart::finishSubstep(StepReport&) { return thread_.takeOver(length_, guard_); }
+StepFailure ThreadPart::finishSubstep(StepReport&)
+{
+  thread_.takeOver(length_);
+  return StepFailure::none;
+}
 
 /// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by
 /// bit.
@@ -97,11 +101,20 @@ bool ThreadPart::shorterMayHelp(StepFailure failure) const
   return failure != StepFailure::overstretched && thread_.overgrownEdge() < 0;
 }
 
-/// Takes out the sharpest fold, if there is one.
+double ThreadPart::sharpestFold() const
+{
+  double cosine = -2.0;
+  return thread_.foldedNode(cosine) < 0 ? 1.0 : 1.0 + cosine;
+}
+
+/// Takes out the sharpest fold that can be taken out.
 bool ThreadPart::mend()
 {
-  const int fold = thread_.foldedNode();
-  return fold >= 0 && mendFold(thread_.work, fold, guard_);
+  double cosine = -2.0;
+  for (int fold = thread_.foldedNode(cosine); fold >= 0; fold = thread_.foldedNode(cosine))
+    if (mendFold(thread_.work, fold, guard_))
+      return true;
+  return false;
 }
 
 void ThreadPart::refuse(StepFailure failure, double length, StepReport& report) const

@@ -27,6 +27,27 @@ void forAllArrays(ThreadState& s, F&& f)
   forEdgeArrays(s, f);
 }
 
+/// Mass with this share of the volume leaves node `from`, with its velocity, and comes to node `to`.
+void moveMomentum(ThreadState& state, int from, int to, double volume)
+{
+  const double own = (to > 0 ? state.volume[to - 1] : 0.0) + (to < state.edges() ? state.volume[to] : 0.0);
+  state.v[to] = (0.5 * own * state.v[to] + volume * state.v[from]) / (0.5 * own + volume);
+}
+
+/// Edge `to`, a neighbour of edge `from`, gets this volume with fluid from there.
+void moveFluid(ThreadState& state, int from, int to, double volume)
+{
+  const double flow = volume - state.volume[to], rest = state.volume[from] - flow;
+  const double length = state.edge(from).norm(), length_to = state.edge(to).norm();
+  moveMomentum(state, from < to ? from : from + 1, from < to ? to + 1 : to, 0.5 * flow);
+  // the rest spins as before, and what it has lost goes with the fluid
+  const double lost = (state.volume[from] * state.volume[from] - rest * rest) / length * state.spin[from];
+  state.spin[to] =
+      (state.volume[to] * state.volume[to] / length_to * state.spin[to] + lost) * length_to / (volume * volume);
+  state.volume[to] = volume;
+  state.volume[from] = rest;
+}
+
 /// Lagrange's polynomial through (s[k], y[k]), k = 0..count-1, at s = 0.
 template <class Value>
 Value interpolate(const double* s, const Value* y, int count)
@@ -173,6 +194,51 @@ void removeNode(ThreadState& state, int i)
     state.twist.back() = 0.0;
 }
 
+void removeEnd(ThreadState& state, int end)
+{
+  const int own = end ? state.edges() - 1 : 0, next = end ? own - 1 : 1;
+  const int node = end ? own + 1 : 0, beyond = end ? next : 2;
+  const double ve = state.volume[own], vf = state.volume[next], le = state.edge(own).norm(),
+               lf = state.edge(next).norm();
+  moveMomentum(state, node, beyond, 0.5 * ve);
+  state.spin[next] = (ve * ve / le * state.spin[own] + vf * vf / lf * state.spin[next]) * lf / ((ve + vf) * (ve + vf));
+  state.volume[next] += ve;
+  forNodeArrays(state, [node](auto& v) { v.erase(v.begin() + node); });
+  forEdgeArrays(state, [own](auto& v) { v.erase(v.begin() + own); });
+  (end ? state.twist.back() : state.twist.front()) = 0.0;
+}
+
+void spreadFluid(ThreadState& state, int j)
+{
+  const auto area = [&](int k) { return state.volume[k] / state.edge(k).norm(); };
+  const auto takes = [&](int k) {
+    return k >= 0 && k < state.edges() && !(state.deposited[k] && state.deposited[k + 1]) && area(k) < area(j);
+  };
+  // With the thinner neighbour first, the wider one takes a share only if it is thinner than both together.
+  int neighbours[2] = {j - 1, j + 1};
+  if (takes(j - 1) && takes(j + 1) && area(j + 1) < area(j - 1))
+    std::swap(neighbours[0], neighbours[1]);
+  double volume = state.volume[j], length = state.edge(j).norm();
+  bool shares[2] = {false, false};
+  for (int k = 0; k < 2; ++k)
+    if (takes(neighbours[k]) && area(neighbours[k]) < volume / length)
+    {
+      volume += state.volume[neighbours[k]];
+      length += state.edge(neighbours[k]).norm();
+      shares[k] = true;
+    }
+  for (int k = 0; k < 2; ++k)
+    if (shares[k])
+      moveFluid(state, j, neighbours[k], volume / length * state.edge(neighbours[k]).norm());
+}
+
+bool mayJoin(const ThreadState& state, int i, const RemeshGuard* guard)
+{
+  const Eigen::Vector3d &a = state.x[i - 1], &c = state.x[i + 1];
+  const double radius = std::sqrt((state.volume[i - 1] + state.volume[i]) / (M_PI * (c - a).norm()));
+  return !guard || guard->hasRoom(state, {i - 1, i, a, c, radius}, {1.0, kFirmShare});
+}
+
 bool mayRemove(const ThreadState& state, int i, const RemeshGuard* guard)
 {
   if (!guard)
@@ -180,30 +246,6 @@ bool mayRemove(const ThreadState& state, int i, const RemeshGuard* guard)
   const double le = state.edge(i - 1).norm(), lf = state.edge(i).norm();
   return guard->allows(state, i - 1, i, state.x[i],
                        state.x[i - 1] + le / (le + lf) * (state.x[i + 1] - state.x[i - 1]));
-}
-
-bool mendFold(ThreadState& state, int fold, const RemeshGuard* guard)
-{
-  if (!state.deposited[fold] || (state.deposited[fold - 1] && state.deposited[fold + 1]))
-  {
-    // the node itself, or a neighbour where the two edges lie so close on each other that nothing would be left of them
-    for (const int i : {fold, fold + 1, fold - 1})
-      if (i > 0 && i + 1 < state.nodes() && state.deposited[i] == state.deposited[fold] &&
-          (state.x[i + 1] - state.x[i - 1]).norm() > 0.1 * std::min(state.edge(i - 1).norm(), state.edge(i).norm()) &&
-          mayRemove(state, i, guard))
-      {
-        removeNode(state, i);
-        return true;
-      }
-    if (state.deposited[fold] || !(state.deposited[fold - 1] || state.deposited[fold + 1]))
-      return false;
-  }
-  const int other = !state.deposited[fold] ? fold : state.deposited[fold + 1] ? fold - 1 : fold + 1;
-  if ((other == 0 && state.ends[0].held) || (other + 1 == state.nodes() && state.ends[1].held))
-    return false;
-  state.v[other] = state.v[other != fold ? fold : state.deposited[fold + 1] ? fold + 1 : fold - 1];
-  state.deposited[other] = 1;
-  return true;
 }
 
 bool breakThread(ThreadState& state, double min_radius, ThreadState& older)

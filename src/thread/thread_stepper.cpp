@@ -257,12 +257,12 @@ bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& in
   return true;
 }
 
-/// The inner node at which the last trial turns most, if that is more than a right angle; -1: there is none.
-int ThreadStepper::Impl::foldedNode() const
+int ThreadStepper::Impl::foldedNode(double& cosine) const
 {
-  const int k = system.sharpestJoint();
-  const int node = k < 0 ? -1 : k - offset_ + first_;
-  return node > 0 && node + 1 < work.nodes() ? node : -1;
+  for (int k = system.sharpestJoint(cosine); k >= 0; k = system.sharpestJoint(cosine))
+    if (const int node = k - offset_ + first_; node > 0 && node + 1 < work.nodes())
+      return node;
+  return -1;
 }
 
 Pose ThreadStepper::Impl::endPose(int end, const ThreadInputs& inputs, double fraction) const
@@ -287,11 +287,15 @@ StepFailure ThreadStepper::Impl::prepare(double from, double to, double duration
   return StepFailure::none;
 }
 
-StepFailure ThreadStepper::Impl::takeOver(double h, const RemeshGuard* guard)
+void ThreadStepper::Impl::takeOver(double h)
 {
   finish(*inputs_, h);
   if (explicit_step)
     push(h);
+}
+
+StepFailure ThreadStepper::Impl::changeMesh(const RemeshGuard* guard)
+{
   if (!remesh(guard))
     return StepFailure::overstretched;
   return overgrownEdge() >= 0 ? StepFailure::squeezed : StepFailure::none;

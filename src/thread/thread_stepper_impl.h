@@ -36,9 +36,13 @@ public:
   StepFailure prepare(double from, double to, double duration);
   /// Explicit step, first half: everything goes on as it moves. What resists this motion is then known.
   StepFailure move(double h);
-  /// Takes the solution over. Then divides, joins and takes away edges, as far as the guard (may be null) allows.
-  StepFailure takeOver(double h, const RemeshGuard* guard);
-  int foldedNode() const;
+  /// Takes the solution over.
+  void takeOver(double h);
+  /// Divides, joins and takes away edges, as far as the guard (may be null) allows.
+  StepFailure changeMesh(const RemeshGuard* guard);
+  /// Returns the inner node at which the last trial turns most, if that is more than a right angle; -1 without one.
+  /// `cosine`: as in ThreadSystem::sharpestJoint().
+  int foldedNode(double& cosine) const;
   /// The edge whose section has grown beyond what a thread can be; -1: there is none. See explainFailure().
   int overgrownEdge() const;
   StepReport refuse(StepReport& report, StepFailure failure, const std::string& message) const;

@@ -407,7 +407,7 @@ bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
   for (int i = first_ + 1; i + 1 < work.nodes(); ++i)
     if (!work.deposited[i] && std::min(work.edge(i - 1).norm(), work.edge(i).norm()) < limits.min_edge_length &&
         (work.x[i + 1] - work.x[i - 1]).norm() < 0.9 * limits.max_edge_length && mayRemove(work, i, guard) &&
-        (!guard || guard->mayJoin(work, i)))
+        mayJoin(work, i, guard))
       removeNode(work, i--);
 
   if (work.ends[0].held)

@@ -57,16 +57,17 @@ RodEvaluation ThreadSystem::takeRestStrains()
   return result;
 }
 
-int ThreadSystem::sharpestJoint() const
+int ThreadSystem::sharpestJoint(double& cosine) const
 {
-  double sharpest = 0.0;
+  const double beyond = cosine;
   int joint = -1;
+  cosine = 0.0;
   for (int i = 1; i + 1 < a_.nodes; ++i)
   {
-    const double cosine = get(a_.t, i - 1).dot(get(a_.t, i));
-    if (cosine < sharpest)
+    const double own = get(a_.t, i - 1).dot(get(a_.t, i));
+    if (own < cosine && own > beyond)
     {
-      sharpest = cosine;
+      cosine = own;
       joint = i;
     }
   }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -28,12 +29,13 @@ constexpr int kDone = 0, kStudyFailed = 1, kBadUsage = 2;
 
 const char kUsage[] =
     "usage: study list\n"
-    "       study run NAME... [--quick] [--judge] [--json FILE] [--out DIR]\n"
+    "       study run NAME... [--quick] [--cases LIST] [--judge] [--json FILE] [--out DIR]\n"
     "       study check [NAME...] [--jobs N] [--xml FILE]\n"
     "       study report [NAME...] --out DIR [--quick] [--jobs N]\n"
     "       study results DIR\n"
     "  NAME     a study of `study list`, or all\n"
     "  --quick  fewer cases and coarser ones: at most a minute or two each\n"
+    "  --cases  only these of a study's numbered cases, such as 7,12,20-24 of coupled_safety\n"
     "  --judge  fails a study that exceeds a bound, misses a bar (timings are not judged) or lacks a figure of its "
     "headlines\n"
     "  check    runs the quick form of every study, or of those named, and judges it; --xml writes the results in "
@@ -66,6 +68,7 @@ int list()
 struct Options
 {
   std::vector<const Study*> chosen;
+  std::vector<int> cases;
   bool quick = false, judge = false;
   std::string json, out;
 };
@@ -80,14 +83,20 @@ bool parse(const std::vector<std::string>& words, Options& options, int& status)
       options.quick = true;
     else if (word == "--judge")
       options.judge = true;
-    else if (word == "--json" || word == "--out")
+    else if (word == "--json" || word == "--out" || word == "--cases")
     {
       if (i + 1 == words.size() || words[i + 1].rfind("--", 0) == 0)
       {
-        status = badUsage(word + " needs a " + (word == "--json" ? "file name" : "directory"));
+        status = badUsage(word + " needs a " +
+                          (word == "--json"  ? "file name"
+                           : word == "--out" ? "directory"
+                                             : "list of numbers"));
         return false;
       }
-      (word == "--json" ? options.json : options.out) = words[++i];
+      if (word == "--cases")
+        options.cases = slender::study::parseCases(words[++i]);
+      else
+        (word == "--json" ? options.json : options.out) = words[++i];
     }
     else if (word.rfind("-", 0) == 0)
     {
@@ -113,6 +122,13 @@ bool parse(const std::vector<std::string>& words, Options& options, int& status)
     status = badUsage("run needs the name of a study");
     return false;
   }
+  if (!options.cases.empty())
+    for (const Study* study : options.chosen)
+      if (!study->numbered)
+      {
+        status = badUsage("the cases of " + study->name + " have no numbers for --cases");
+        return false;
+      }
   return true;
 }
 
@@ -158,6 +174,7 @@ int run(const Options& options)
   {
     contexts.push_back(std::make_unique<StudyContext>(study->name, options.quick, true));
     StudyContext& context = *contexts.back();
+    context.choose(options.cases);
     const auto start = std::chrono::steady_clock::now();
     StudyResult result{&context, 0.0, ""};
     try
@@ -281,7 +298,14 @@ int main(int argc, char** argv)
     return badUsage("unknown command " + words[0]);
   Options options;
   int status = kDone;
-  if (!parse({words.begin() + 1, words.end()}, options, status))
-    return status;
+  try
+  {
+    if (!parse({words.begin() + 1, words.end()}, options, status))
+      return status;
+  }
+  catch (const std::invalid_argument& error)
+  {
+    return badUsage(error.what());
+  }
   return run(options);
 }

@@ -34,6 +34,43 @@ TEST(StudyFrame, worstErrorIsTheLargestOverItsBound)
   EXPECT_NEAR(metric(context, "worst_error_over_bound"), 0.5, 1e-12);
 }
 
+TEST(StudyFrame, casesAreChosenByNumbersAndRanges)
+{
+  EXPECT_EQ(parseCases("7,12,20-22"), (std::vector<int>{7, 12, 20, 21, 22}));
+  for (const char* bad : {"", "7,", "a", "-3", "5-", "9-8", "1.5", "1 2", "99999999"})
+    EXPECT_THROW(parseCases(bad), std::invalid_argument) << bad;
+
+  StudyContext context("frame", true, false);
+  EXPECT_EQ(context.cases(3), (std::vector<int>{0, 1, 2}));
+  context.choose({766, 2});
+  EXPECT_EQ(context.cases(3), (std::vector<int>{766, 2}));
+}
+
+TEST(StudyFrame, onlyTheChosenScenesOfASafetyStudyRun)
+{
+  const Study* study = findStudy("coupled_safety");
+  ASSERT_TRUE(study && study->numbered);
+  StudyContext context(study->name, true, false);
+  context.choose({5});
+  study->run(context);
+  ASSERT_EQ(context.rows().size(), 1u);
+  EXPECT_EQ(std::get<double>(*context.rows().front().find("scene")), 5.0);
+  EXPECT_EQ(metric(context, "scenes"), 1.0);
+}
+
+/// In these scenes a ball presses on held corners while threads divide (417), a rope folds (469), and things that are
+/// thrown got around the rim of a sheet in one step (772, 881).
+TEST(StudyFrame, scenesWithFoldsAndRimsHold)
+{
+  const Study* study = findStudy("coupled_safety");
+  ASSERT_TRUE(study);
+  StudyContext context(study->name, true, false);
+  context.choose({417, 469, 772, 881});
+  study->run(context);
+  for (const char* name : {"penetrations", "thickness_violations", "refused"})
+    EXPECT_EQ(metric(context, name), 0.0) << name;
+}
+
 TEST(StudyFrame, aCheckWithoutANumberIsNoSuccess)
 {
   StudyContext context("frame", true, false);

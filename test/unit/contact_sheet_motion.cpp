@@ -214,6 +214,52 @@ TEST(ContactSheetMotion, TermsDependOnTheConfigurationOnly)
 }
 
 /// Cloth that falls as a whole has no candidates, but what it falls on is found.
+/// The straight way from begin() to the end of a step leads through a cloth, or past it.
+TEST(ContactSheetMotion, WhatPassesACloth)
+{
+  Scene s;
+  s.addCloth(gridMesh(0.3, 0.3, 3, 3, GridPattern::alternating), Vector::Zero(), Eigen::Quaterniond::Identity());
+  const Eigen::Index corners = s.x.cols();
+  s.addRod({0.02, 0.03, 0.05}, {0.06, 0.03, 0.05}, 2);
+  s.addSolid(Sphere{0.01}, {{-0.1, 0.12, 0.05}, Eigen::Quaterniond::Identity()});
+  ContactPotential potential = s.potential();
+  potential.begin(s.x, s.solids, 0.01);
+  const auto passes = [&](const Vector& rod, const Vector& ball, const Vector& cloth) {
+    Eigen::Matrix3Xd x = s.x;
+    x.leftCols(corners).colwise() += cloth;
+    x.rightCols(3).colwise() += rod;
+    std::vector<Pose> solids = s.solids;
+    solids[0].position += ball;
+    return potential.passedSheet(x, solids);
+  };
+  const Vector none = Vector::Zero(), down(0, 0, -0.1), past(0.4, 0, -0.1);
+  EXPECT_FALSE(passes(none, none, none));
+  EXPECT_TRUE(passes(down, none, none));
+  EXPECT_TRUE(passes(none, down, none));
+  EXPECT_TRUE(passes(none, none, -down));
+  EXPECT_FALSE(passes(past, none, none));
+  EXPECT_FALSE(passes(none, -past, none));
+  EXPECT_FALSE(passes(down, down, down));   // all of them together
+  EXPECT_FALSE(passes(0.4 * down, 0.4 * down, none));
+}
+
+/// Pieces that are new since the last step know again what presses on their held points.
+TEST(ContactSheetMotion, WhatPressesOnHeldPointsMeetsNoNewPiece)
+{
+  Scene s;
+  s.addCloth(gridMesh(0.3, 0.3, 3, 3, GridPattern::alternating), Vector::Zero(), Eigen::Quaterniond::Identity());
+  const int held = 5;
+  s.addSolid(Sphere{0.02}, {s.x.col(held), Eigen::Quaterniond::Identity()});
+  ContactPotential potential = s.potential();
+  EXPECT_FALSE(potential.thinToFit(s.x, s.solids));
+  for (ContactTriangle& t : s.surface.triangles)
+    for (int k = 0; k < 3; ++k)
+      if (t.corner[k] == held)
+        t.driven = static_cast<unsigned char>(t.driven | 1 << k);
+  potential.setPieces(s.surface);
+  EXPECT_TRUE(potential.thinToFit(s.x, s.solids));
+}
+
 TEST(ContactSheetMotion, FallsOntoATable)
 {
   Scene s;

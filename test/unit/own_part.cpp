@@ -1,5 +1,6 @@
 // A kind of part that the package does not have, in an island with a rod and a cloth (docs/architecture.md).
 #include <cmath>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -11,7 +12,7 @@ namespace {
 
 /// A ball of mass m [kg] at x [m] on a spring of stiffness k [N/m] to its anchor, by implicit Euler. It has three
 /// unknowns, and its surface is one segment between two points at the same place.
-class SpringBall final : public Part
+class SpringBall : public Part
 {
 public:
   Vector3d x, v{0, 0, 0};   ///< where the last accepted substep ended [m], [m/s]
@@ -121,6 +122,34 @@ private:
   Eigen::Matrix3d hessian_;
 };
 
+/// A ball that says how much it is folded. While it is folded sharply, no step succeeds.
+class FoldedBall final : public SpringBall
+{
+public:
+  double fold;   ///< see Part::sharpestFold()
+  bool mended = false;
+  std::string* calls = nullptr;   ///< gets a letter for each call at the end of a substep
+
+  FoldedBall(const Vector3d& at, double how_sharp) : SpringBall(at), fold(how_sharp) {}
+  StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override
+  {
+    SpringBall::beginSubstep(plan, substep);
+    return fold < 0.1 && !mended ? StepFailure::folded_back : StepFailure::none;
+  }
+  double sharpestFold() const override { return mended ? 1.0 : fold; }
+  bool mend() override { return mended = true; }
+  StepFailure finishSubstep(StepReport&) override { return note('f'); }
+  StepFailure changeMesh() override { return note('m'); }
+
+private:
+  StepFailure note(char call)
+  {
+    if (calls)
+      calls->push_back(call);
+    return StepFailure::none;
+  }
+};
+
 StepReport step(ClothIsland& island)
 {
   const StepReport report = island.step();
@@ -143,6 +172,29 @@ TEST(OwnPart, SwingsOnItsOwn)
     x += kIslandStep * v;
     EXPECT_NEAR(ball.x.z(), x, 1e-12);   // round-off of a tenth of a metre
   }
+}
+
+/// What is merely bent does not change if a step fails because of a fold elsewhere.
+TEST(OwnPart, TheSharpestFoldIsMended)
+{
+  FoldedBall bent({0, 0, 0}, 0.8), folded({1, 0, 0}, 0.01);
+  ClothIsland island(kIslandStep, kIslandGap);
+  island.others = {&bent, &folded};
+  EXPECT_EQ(step(island).mended_folds, 1);
+  EXPECT_TRUE(folded.mended);
+  EXPECT_FALSE(bent.mended);
+}
+
+/// A mesh changes when all parts are where the substep ends.
+TEST(OwnPart, MeshesChangeAfterAllPartsHaveMoved)
+{
+  std::string calls;
+  FoldedBall a({0, 0, 0}, 1.0), b({1, 0, 0}, 1.0);
+  a.calls = b.calls = &calls;
+  ClothIsland island(kIslandStep, kIslandGap);
+  island.others = {&a, &b};
+  step(island);
+  EXPECT_EQ(calls, "ffmm");
 }
 
 /// It flies against a rod and a cloth. What it loses they gain, up to Newton's tolerance, and nothing passes through.

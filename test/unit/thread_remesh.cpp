@@ -163,6 +163,65 @@ TEST(ThreadRemesh, FoldsAreTakenOut)
     EXPECT_GT(closed.edge(j).norm(), 0.3);
 }
 
+TEST(ThreadRemesh, EndsAndSpreadFluidConserveVolumeAndMomentum)
+{
+  Random random(6);
+  for (int k = 0; k < 10; ++k)
+  {
+    ThreadState s = wigglyThread(9, random);
+    spinUp(s, random);
+    const double volume = s.totalVolume(), spin = spinMomentum(s);
+    const Vector3d momentum = momentumOf(s);
+    if (k < 2)
+      removeEnd(s, k);
+    else
+      spreadFluid(s, k - 2);
+    EXPECT_EQ(s.nodes(), k < 2 ? 8 : 9);
+    EXPECT_NEAR(s.totalVolume(), volume, 1e-14 * volume);
+    EXPECT_LT((momentumOf(s) - momentum).norm(), 1e-14);
+    EXPECT_NEAR(spinMomentum(s), spin, 1e-13 * spin);
+  }
+  // A wide edge gives fluid until it is as wide as its neighbours. They take none from a thin one.
+  Eigen::Matrix3Xd x(3, 4);
+  x << 0, 1, 1.2, 2.2, 0, 0, 0, 0, 0, 0, 0, 0;
+  ThreadState s = makeThread(x, Vector3d(0.1, 0.5, 0.2));
+  spreadFluid(s, 1);
+  for (int j = 0; j < 3; ++j)
+    EXPECT_NEAR(s.radius(j), std::sqrt((0.01 + 0.2 * 0.25 + 0.04) / 2.2), 1e-12);
+  ThreadState thin = makeThread(x, Vector3d(0.3, 0.1, 0.2));
+  spreadFluid(thin, 1);
+  EXPECT_NEAR(thin.radius(1), 0.1, 1e-12);
+}
+
+/// A hairpin of two edges that cover each other becomes one edge.
+TEST(ThreadRemesh, AHairpinLosesItsEnd)
+{
+  Eigen::Matrix3Xd x(3, 3);
+  x << 0, 1, 0.02, 0, 0, 0.01, 0, 0, 0;
+  ThreadState s = makeThread(x, Eigen::Vector2d(0.1, 0.1)), held = s;
+  const double volume = s.totalVolume();
+  ASSERT_TRUE(mendFold(s, 1));
+  ASSERT_EQ(s.nodes(), 2);
+  EXPECT_GT(s.edge(0).norm(), 0.9);
+  EXPECT_NEAR(s.totalVolume(), volume, 1e-15);
+  held.ends[0].held = held.ends[1].held = true;
+  EXPECT_FALSE(mendFold(held, 1));
+}
+
+/// Where two edges lie on each other, their fluid does not become a disc.
+TEST(ThreadRemesh, TheFluidOfAFoldFlowsOn)
+{
+  Eigen::Matrix3Xd x(3, 7);
+  x << 0, 1, 2, 3, 2.15, 3.1, 4.1, 0, 0, 0, 0, 0.02, 0, 0, 0, 0, 0, 0, 0, 0, 0;
+  ThreadState s = makeThread(x, Eigen::VectorXd::Constant(6, 0.1));
+  ASSERT_TRUE(mendFold(s, 3));
+  EXPECT_EQ(s.nodes(), 6);
+  for (int j = 0; j < s.edges(); ++j)
+    EXPECT_LT(s.radius(j), 0.15) << j;
+  for (int i = 1; i + 1 < s.nodes(); ++i)
+    EXPECT_GT(s.edge(i - 1).normalized().dot(s.edge(i).normalized()), -0.5) << i;
+}
+
 TEST(ThreadRemesh, DroppingCountsTheVolume)
 {
   Random random(5);
@@ -188,7 +247,8 @@ struct Shelf : RemeshGuard
   {
     return std::min(from.z(), to.z()) > height;
   }
-  bool mayJoin(const ThreadState&, int) const override { return true; }
+  bool hasRoom(const ThreadState&, const Edge&, const Room&) const override { return has_room; }
+  bool has_room = true;
 };
 
 TEST(ThreadRemesh, AGuardKeepsNodes)
@@ -205,7 +265,10 @@ TEST(ThreadRemesh, AGuardKeepsNodes)
   folded.x[3] << 1.2, 0, 0;
   folded.x[4] << 1.5, 0, -1.0;
   const int nodes = folded.nodes();
+  Shelf full(-0.5);
+  full.has_room = false;
   EXPECT_FALSE(mendFold(folded, 2, &high));
+  EXPECT_FALSE(mendFold(folded, 2, &full));
   EXPECT_EQ(folded.nodes(), nodes);
   EXPECT_TRUE(mendFold(folded, 2, &low));
   EXPECT_EQ(folded.nodes(), nodes - 1);
@@ -237,6 +300,37 @@ TEST(ThreadRemesh, AnEdgeDoesNotCutThroughTheCornerOfASolid)
   EXPECT_TRUE(mayRemove(s, 3, &guard));    // along the upper side
   placeBox(-1.0);
   EXPECT_TRUE(mayRemove(s, 2, &guard));
+}
+
+/// A thread that is folded above a box: the fluid of both edges needs more room than there is.
+TEST(ThreadRemesh, AJoinedEdgeNeedsRoomAboveASolid)
+{
+  Eigen::Matrix3Xd x(3, 5);
+  x << -1.0, 0.0, 0.3, 0.05, 1.0, 0, 0, 0.05, 0, 0, 0, 0, 0, 0, 0;
+  ThreadState s = makeThread(x, Eigen::VectorXd::Constant(4, 0.05));
+  Equations island(false);
+  ContactSurface surface;
+  surface.solids.push_back({{Box{{4.0, 4.0, 1.0}}, -1.0, "box"}});
+  island.solids.emplace_back();
+  island.setContact(surface, ContactOptions{0.01});
+  ThreadGuard guard(0.01);
+  guard.setIsland(&island);
+  guard.setStrands({{&s, ContactProperties(), 0.0}});
+  const auto placeBelow = [&](double distance) {
+    island.solids[0].start.position.z() = island.solids[0].target.X_WG.position.z() = -0.5 - distance;
+    island.beginStep(1.0);
+    island.beginSubstep(0.0);
+  };
+  const double joined = 0.05 * std::sqrt((s.edge(1).norm() + s.edge(2).norm()) / 0.05);   // from node 1 to node 3
+  placeBelow(0.06);
+  EXPECT_FALSE(mayJoin(s, 2, &guard));
+  EXPECT_TRUE(guard.hasRoom(s, {1, 2, s.x[1], s.x[3], 0.06}, {1.0, 1.0}));
+  EXPECT_FALSE(guard.hasRoom(s, {1, 2, s.x[1], s.x[3], 0.061}, {1.0, 1.0}));
+  EXPECT_TRUE(mayJoin(s, 1, &guard));   // of edges in line
+  placeBelow(0.99 * kFirmShare * joined);
+  EXPECT_FALSE(mayJoin(s, 2, &guard));
+  placeBelow(1.01 * kFirmShare * joined);
+  EXPECT_TRUE(mayJoin(s, 2, &guard));
 }
 
 TEST(ThreadRemesh, ADividedEdgeMayStayStraight)

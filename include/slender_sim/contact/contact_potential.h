@@ -260,6 +260,11 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
 
+  /// Whether anything is on the other side of a cloth than at begin(), if points and solids' origins have gone straight
+  /// to where they are now. The iterates of a solution may have led around the rim of the cloth in one long step,
+  /// without touching it. Only what has moved against the cloth by more than half of its shortest edge is looked at.
+  bool passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
+
   /// Returns the potential [J] at a configuration, plus the constant of followFriction(). It is infinite where surfaces
   /// meet or x is not finite. Fills terms(), in an order that depends on x and solids only; their stiffness and rows()
   /// are computed only on request. The second derivative is exact for pairs of segments and triangles. For solids, the

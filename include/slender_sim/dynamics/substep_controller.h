@@ -9,7 +9,8 @@ namespace slender {
 struct Substep
 {
   double from = 0.0, to = 0.0;
-  double length = 0.0;   ///< to - from without its rounding error [s]
+  double length = 0.0;      ///< to - from without its rounding error [s]
+  bool may_halve = false;   ///< if the attempt fails, the next one is half as long
 };
 
 /// How a step is divided into substeps.

@@ -93,6 +93,11 @@ public:
 
   bool quick() const { return quick_; }
 
+  /// Restricts a study with numbered cases to these of them. With an empty list it runs all.
+  void choose(std::vector<int> cases) { chosen_ = std::move(cases); }
+  /// Returns the numbers of the cases to run: the chosen ones, or 0 to count - 1. A chosen number may exceed count.
+  std::vector<int> cases(int count) const;
+
   /// Shows "study  done/total  what" on stderr: rewritten in place on a terminal, else a line every ten seconds.
   void progress(int done, int total, const std::string& what);
   void clearProgress();
@@ -117,6 +122,7 @@ public:
 
 private:
   std::string name_;
+  std::vector<int> chosen_;
   bool quick_, show_progress_, on_terminal_, line_shown_ = false;
   std::chrono::steady_clock::time_point last_progress_;
   std::deque<Row> rows_;
@@ -131,12 +137,16 @@ struct Study
   std::string name;
   std::string description;   ///< one line
   std::function<void(StudyContext&)> run;
+  bool numbered = false;   ///< its cases have numbers, by which some of them can be run alone
 };
+
+/// Returns the numbers of a list such as "7,12,20-24". Throws std::invalid_argument for anything else.
+std::vector<int> parseCases(const std::string& list);
 
 /// Makes a study known to studies(). Each study has one object of this class beside its function.
 struct StudyRegistration
 {
-  StudyRegistration(const char* name, const char* description, void (*run)(StudyContext&));
+  StudyRegistration(const char* name, const char* description, void (*run)(StudyContext&), bool numbered = false);
 };
 
 /// All studies, sorted by name.

@@ -43,8 +43,9 @@ public:
   void hold(int node) { holds_.hold(node); }
   void holdTurn(int edge) { holds_.holdTurn(edge); }
 
-  /// Joint of the last trial with the sharpest turn beyond a right angle, -1: none.
-  int sharpestJoint() const;
+  /// Returns the joint of the last trial with the sharpest turn beyond a right angle; -1 without one. `cosine` is that
+  /// of its turn. Joints whose cosine is not above its value before the call are left out; -2 leaves out none.
+  int sharpestJoint(double& cosine) const;
 
   /// Residual over force scale beyond which a step is not solved, however small the increment: inertia of very short
   /// steps leaves nothing else to see.

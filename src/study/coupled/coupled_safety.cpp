@@ -384,12 +384,14 @@ void runScene(StudyContext& context, int number, Tally& tally)
 
 void runCoupledSafety(StudyContext& context)
 {
-  const int scenes = context.quick() ? 24 : 1000;
+  const std::vector<int> numbers = context.cases(context.quick() ? 24 : 1000);
+  const int scenes = static_cast<int>(numbers.size());
   Tally tally;
   for (int k = 0; k < scenes; ++k)
   {
-    context.progress(k, scenes, RandomScene(1000u + static_cast<unsigned>(k)).kinds());
-    runScene(context, k, tally);
+    const int number = numbers[static_cast<std::size_t>(k)];
+    context.progress(k, scenes, RandomScene(1000u + static_cast<unsigned>(number)).kinds());
+    runScene(context, number, tally);
   }
   context.metric("scenes", scenes);
   context.metric("penetrations", tally.penetrations);
@@ -404,6 +406,7 @@ void runCoupledSafety(StudyContext& context)
 }
 
 const StudyRegistration kCoupledSafetyRegistration{
-    "coupled_safety", "random scenes that mix all kinds of objects: nothing passes through anything", runCoupledSafety};
+    "coupled_safety", "random scenes that mix all kinds of objects: nothing passes through anything", runCoupledSafety,
+    true};
 
 }   // namespace slender::study

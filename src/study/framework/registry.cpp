@@ -14,11 +14,13 @@ std::vector<Study>& registeredStudies()
 
 }   // namespace
 
-StudyRegistration::StudyRegistration(const char* name, const char* description, void (*run)(StudyContext&))
+StudyRegistration::StudyRegistration(const char* name, const char* description, void (*run)(StudyContext&),
+                                     bool numbered)
 {
   std::vector<Study>& all = registeredStudies();
   const auto before = [](const Study& study, const std::string& other) { return study.name < other; };
-  all.insert(std::lower_bound(all.begin(), all.end(), std::string(name), before), Study{name, description, run});
+  all.insert(std::lower_bound(all.begin(), all.end(), std::string(name), before),
+             Study{name, description, run, numbered});
 }
 
 const std::vector<Study>& studies() { return registeredStudies(); }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <numeric>
+#include <sstream>
 #include <stdexcept>
 
 #include <unistd.h>
@@ -62,6 +64,31 @@ Series& Plot::at(const std::string& label)
   return series.back();
 }
 
+std::vector<int> parseCases(const std::string& list)
+{
+  constexpr int kMost = 1000000;
+  const auto number = [&](const std::string& digits) {
+    const bool sound = !digits.empty() && digits.size() < 8 && digits.find_first_not_of("0123456789") == digits.npos;
+    const int value = sound ? std::stoi(digits) : kMost;
+    if (value >= kMost)
+      throw std::invalid_argument("'" + list + "' is no list of numbers below " + std::to_string(kMost) +
+                                  " such as 7,12,20-24");
+    return value;
+  };
+  std::vector<int> cases;
+  std::istringstream words(list + ",");
+  for (std::string word; std::getline(words, word, ',');)
+  {
+    const std::size_t dash = word.find('-');
+    const int first = number(word.substr(0, dash)), last = dash == word.npos ? first : number(word.substr(dash + 1));
+    for (int k = first; k <= last; ++k)
+      cases.push_back(k);
+  }
+  if (cases.empty())
+    number("");   // a range that runs backwards
+  return cases;
+}
+
 StudyContext::StudyContext(std::string study, bool quick, bool show_progress)
   : name_(std::move(study)),
     quick_(quick),
@@ -72,6 +99,15 @@ StudyContext::StudyContext(std::string study, bool quick, bool show_progress)
 }
 
 StudyContext::~StudyContext() { clearProgress(); }
+
+std::vector<int> StudyContext::cases(int count) const
+{
+  if (!chosen_.empty())
+    return chosen_;
+  std::vector<int> all(static_cast<std::size_t>(count));
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
 
 void StudyContext::progress(int done, int total, const std::string& what)
 {

@@ -1,0 +1,94 @@
+// What may have passed through a cloth although no iterate of a solution touched it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contact_potential_impl.h"
+
+namespace slender {
+
+void ContactPotential::Impl::takeDisplacements(const Eigen::Matrix3Xd& x_end)
+{
+  displacements_.assign(surface.objects.size(), {});
+  for (const ContactSegment& s : surface.segments)
+    for (const int point : {s.a, s.b})
+      displacements_[s.object].box.include(x_end.col(point) - x_begin.col(point));
+  for (const ContactTriangle& t : surface.triangles)
+    for (int k = 0; k < 3; ++k)
+    {
+      const int a = t.corner[k], b = t.corner[(k + 1) % 3];
+      Displacements& own = displacements_[t.object];
+      own.box.include(x_end.col(a) - x_begin.col(a));
+      own.shortest_edge = std::min(own.shortest_edge, (x_end.col(b) - x_end.col(a)).norm());
+    }
+}
+
+/// Whether anything has moved far against a cloth since begin(), measured by the shortest edge of the cloth. What moves
+/// less cannot get from one side to the other without coming near the rim.
+bool ContactPotential::Impl::movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
+{
+  constexpr double kFar = 0.5;   // of the shortest edge
+  takeDisplacements(x_end);
+  const auto far = [&](const Displacements& cloth, const BoundingBox& other) {
+    const Eigen::Vector3d most =
+        (cloth.box.high - other.low).cwiseAbs().cwiseMax((other.high - cloth.box.low).cwiseAbs());
+    return most.norm() > kFar * cloth.shortest_edge;
+  };
+  for (std::size_t i = 0; i < displacements_.size(); ++i)
+  {
+    const Displacements& cloth = displacements_[i];
+    if (!std::isfinite(cloth.shortest_edge) || !surface.objects[i].others)
+      continue;
+    for (std::size_t k = 0; k < displacements_.size(); ++k)
+      if (const BoundingBox& other = displacements_[k].box;
+          k != i && surface.objects[k].others && other.low.x() <= other.high.x() && far(cloth, other))
+        return true;
+    for (std::size_t k = 0; k < solids_end.size(); ++k)
+    {
+      const Eigen::Vector3d way = solids_end[k].position - solids_begin[k].position;
+      if (far(cloth, {way, way}))
+        return true;
+    }
+  }
+  return false;
+}
+
+bool ContactPotential::Impl::passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
+{
+  if (sheets_.empty() || !movedFar(x_end, solids_end))
+    return false;
+  swept_.build(surface, sheets_, solids, {x_begin, x_end, solids_begin, solids_end}, options.gap, 0.0, 0.0);
+  ApproachLimit limit;
+  // Only middle surfaces that cross count. Surfaces that slide may come nearer than their thickness on straight ways.
+  limit.thickness = 0.0;
+  limit.reach = 1e-3 * options.gap;
+  const auto motion = [&](int i) { return MovingPoint{x_begin.col(i), x_end.col(i)}; };
+  const auto crosses = [](double share) { return share > 0.0 && share < 1.0; };   // 0: they cross at the start
+  for (const SheetCandidates::Pair& pair : swept_.sheets().pairs())
+  {
+    if (pair.edges)
+    {
+      const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
+      if (a.object != b.object && crosses(segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit)))
+        return true;
+      continue;
+    }
+    const SheetPieces::Point& p = sheets_.points[pair.first];
+    const ContactTriangle& t = surface.triangles[pair.second];
+    if (p.object != t.object && crosses(pointTriangleLimit(motion(p.point), motion(t.corner[0]), motion(t.corner[1]),
+                                                           motion(t.corner[2]), limit)))
+      return true;
+  }
+  for (const SheetCandidates::OnSolid& on : swept_.sheets().onSolids())
+  {
+    if (on.face.corners != 3 || !surface.objects[on.face.object].others || passes(on))
+      continue;
+    const MovingPoint middle{solids_begin[on.solid].position, solids_end[on.solid].position};
+    const auto& c = on.face.corner;
+    if (crosses(pointTriangleLimit(middle, motion(c[0]), motion(c[1]), motion(c[2]), limit)))
+      return true;
+  }
+  return false;
+}
+
+}   // namespace slender
