@@ -8,9 +8,9 @@ namespace slender {
 
 namespace {
 
-/// Measured (study tracking_overhead): for fewer averages sweeps are faster. The more there are, the less their
-/// stiffness is that of the preconditioner.
-constexpr int kPointsPerAverage = 50;
+/// Measured (study tracking_overhead): for fewer points and fewer averages sweeps are faster. The more averages there
+/// are, the less their stiffness is that of the preconditioner.
+constexpr int kMostSwept = 3000, kPointsPerAverage = 50;
 // measured likewise: of bending over inertia. Sweeps carry from edge to edge what bends a plate as a whole
 constexpr double kStiffestSwept = 300.0;
 

@@ -13,8 +13,7 @@ ClothSolver solverOf(const ClothModel& model, const ClothOptions& options)
 {
   if (options.solver != ClothSolver::automatic)
     return options.solver;
-  const bool fine = options.one_newton_step && model.vertices() > ClothLinearSolver::kMostSwept;
-  return fine || !model.averages.empty() ? ClothSolver::conjugate_gradients : ClothSolver::gauss_seidel;
+  return model.averages.empty() ? ClothSolver::gauss_seidel : ClothSolver::conjugate_gradients;
 }
 
 ClothLinearSolver::ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system)

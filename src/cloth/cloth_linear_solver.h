@@ -28,11 +28,6 @@ ClothSolver solverOf(const ClothModel& model, const ClothOptions& options);
 class ClothLinearSolver
 {
 public:
-  /// Measured (study implicit_step): in linearised steps sweeps are faster up to so many points, the constant factor
-  /// above. Newton's method visits strained shapes, which the constant factor describes badly. For a
-  /// hanging sheet of 6,561 vertices sweeps took 128 s for 100 steps, and the constant factor 200 s for 50.
-  static constexpr int kMostSwept = 3000;
-
   /// Model and system must outlive this. For ClothSolver::cholesky the blocks of the system contain its constant
   /// matrix.
   ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system);

@@ -30,9 +30,9 @@ struct ClothEnergies
 
 enum class ClothSolver
 {
-  /// conjugate_gradients with averages, and for one_newton_step above 3,000 vertices, else gauss_seidel (measured:
-  /// studies implicit_step, cloth_accuracy). Steps with one_newton_step and averages without bounds, up to 3,000
-  /// vertices and no more than one average per 50 of them, are swept as well, but for plates (tracking_overhead).
+  /// conjugate_gradients with averages, else gauss_seidel (measured: study implicit_step). Steps with one_newton_step
+  /// and averages without bounds, up to 3,000 vertices and no more than one average per 50 of them, are swept as well,
+  /// but for plates (tracking_overhead).
   automatic,
   cholesky,   ///< factorisation of the whole matrix
               /// preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the

@@ -282,7 +282,7 @@ struct Line
   double at(double x) const { return constant + slope * x; }
 };
 
-// vertices; below, what does not depend on the size shows, and cloth of up to 3,000 has another linear solver
+// vertices; below, what does not depend on the size shows
 constexpr double kFitFrom = 3500;
 constexpr double kLarge = 1e6;
 

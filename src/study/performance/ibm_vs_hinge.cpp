@@ -408,9 +408,8 @@ void runIbmVsHinge(StudyContext& context)
     context.metric("product_over_bandwidth_bound", bound);
   context.note("Isometric Hessian: assembled once, spread over 1,000 steps; a step then does nothing for it.");
   context.note(
-      "implicit step (implicit_step_speedup_min): both by conjugate gradients to the same tolerance, by sweeps or "
-      "(above 3,000 vertices) preconditioned by mass and rest membrane, the same matrix for both: bending is too small "
-      "here to be in it, so hinges may use it as well.");
+      "implicit step (implicit_step_speedup_min): both by conjugate gradients to the same tolerance, preconditioned by "
+      "sweeps.");
   context.note(
       "implicit_step_speedup_over_usual_hinge_solvers_min: over the fastest of hinges factored in every step, by CG "
       "with their diagonal blocks, and by CG with their Hessian at rest; the last two to the error of the step's own "
