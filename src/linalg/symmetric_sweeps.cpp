@@ -41,6 +41,11 @@ void putBlock(const Eigen::Matrix3d& block, int stride, Scalar* to)
       to[stride * c + r] = static_cast<Scalar>(block(r, c));
 }
 
+double squareOf(const PointVector& v)
+{
+  return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())).squaredNorm();
+}
+
 double largest(const PointVector& v)
 {
   return v.empty()
@@ -460,7 +465,7 @@ LinearResult SymmetricSweeps::Impl::solve(const PointVector& right_hand_side, Po
                                           int max_iterations)
 {
   constexpr double kLeastInSinglePrecision = 1e-6;   // More accurate solutions would need several searches.
-  const NoTinyNumbers no_tiny_numbers;
+  [[maybe_unused]] const NoTinyNumbers no_tiny_numbers;
   LinearResult result;
   std::fill(x.begin(), x.end(), 0.0);
   std::fill(solution_.begin(), solution_.end(), 0.0);
@@ -475,7 +480,7 @@ LinearResult SymmetricSweeps::Impl::solve(const PointVector& right_hand_side, Po
   }
   if (end == SearchEnd::stalled)
   {
-    if (!(largest(residual_) <= largest(right_)))
+    if (!(squareOf(residual_) <= squareOf(right_)))   // or it is not finite
     {
       std::fill(solution_.begin(), solution_.end(), 0.0);
       residual_ = right_;
