@@ -320,8 +320,8 @@ void SymmetricSweeps::Impl::leave(PointVector& x)
     point(residual_, v) = point(right_, v) - point(product_, order_[v]);
 }
 
-/// Begins a search for the solution with `from` / `size`: x = 0, r = (D + L)^-1 `from` / size and z = p = D r. Returns
-/// r . z.
+/// Begins a search for the solution with the right-hand side from / size. Sets x = 0, r = (D + L)^-1 from / size and
+/// z = p = D r. Returns r . z.
 template <class Scalar>
 double SymmetricSweeps::Impl::load(Search<Scalar>& s, const PointVector& from, double size)
 {
@@ -407,7 +407,7 @@ SymmetricSweeps::Impl::SearchEnd SymmetricSweeps::Impl::negative(const Search<Sc
   return curvature < -Search<Scalar>::kLeast * sum ? SearchEnd::not_definite : SearchEnd::stalled;
 }
 
-/// Searches for what is missing in solution_, and again for what that search has left, until the residual is small.
+/// Repeats a search for the correction of solution_ (iterative refinement), until the residual is small.
 template <class Scalar>
 SymmetricSweeps::Impl::SearchEnd SymmetricSweeps::Impl::refine(Search<Scalar>& s, PointVector& x, double tolerance,
                                                                int max_iterations, LinearResult& result)

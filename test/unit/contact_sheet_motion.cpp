@@ -243,7 +243,7 @@ TEST(ContactSheetMotion, WhatPassesACloth)
   EXPECT_FALSE(passes(0.4 * down, 0.4 * down, none));
 }
 
-/// Pieces that are new since the last step know again what presses on their held points.
+/// If the pieces of a surface are rebuilt, contact still lets pass what presses on their held points.
 TEST(ContactSheetMotion, WhatPressesOnHeldPointsMeetsNoNewPiece)
 {
   Scene s;

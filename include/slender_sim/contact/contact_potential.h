@@ -260,9 +260,9 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
 
-  /// Whether anything is on the other side of a cloth than at begin(), if points and solids' origins have gone straight
-  /// to where they are now. The iterates of a solution may have led around the rim of the cloth in one long step,
-  /// without touching it. Only what has moved against the cloth by more than half of its shortest edge is looked at.
+  /// Returns whether anything would have crossed a cloth if points and the origins of solids had moved straight from
+  /// begin() to their present places. In one long step the iterates of a solution can go around the rim of a cloth
+  /// without touching it. Things that moved less than half of the cloth's shortest edge against it are not examined.
   bool passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
 
   /// Returns the potential [J] at a configuration, plus the constant of followFriction(). It is infinite where surfaces

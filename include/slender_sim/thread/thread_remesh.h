@@ -19,7 +19,8 @@ public:
     Eigen::Vector3d from, to;
     double radius;   ///< [m]
   };
-  /// Shares of the thickness towards other threads and rods, and towards solids and faces of cloths.
+  /// How much distance an edge needs, as shares of the thickness: from other threads and rods, and from solids and
+  /// faces of cloths.
   struct Room
   {
     double others, solids;
@@ -53,9 +54,9 @@ void removeEnd(ThreadState& state, int end);
 void spreadFluid(ThreadState& state, int j);
 
 /// Takes out the fold at an inner node. A node there, or a free end beside it, is removed, because the fluid on both
-/// sides has flowed together; of the removals that take out the fold, the one that leaves the thinnest edge. Where a
-/// free edge folds back on one that lies on the floor, the node is held there as it is. Returns false if nothing can be
-/// done, or if the guard (may be null) forbids it.
+/// sides has flowed together. If several removals take out the fold, that which leaves the thinnest edge is chosen.
+/// Where a free edge folds back on one that lies on the floor, the node is held there as it is. Returns false if
+/// nothing can be done, or if the guard (may be null) forbids it.
 bool mendFold(ThreadState& state, int node, const RemeshGuard* guard = nullptr);
 /// Where a node lies after its removal: on the joined edge, which its two edges become. Whether a guard (may be null)
 /// allows it.

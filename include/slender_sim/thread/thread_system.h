@@ -43,8 +43,9 @@ public:
   void hold(int node) { holds_.hold(node); }
   void holdTurn(int edge) { holds_.holdTurn(edge); }
 
-  /// Returns the joint of the last trial with the sharpest turn beyond a right angle; -1 without one. `cosine` is that
-  /// of its turn. Joints whose cosine is not above its value before the call are left out; -2 leaves out none.
+  /// Returns the joint that turns most sharply in the last trial, or -1 if no joint turns by more than a right angle.
+  /// On return, `cosine` is the cosine of the turn. Only joints with a larger cosine than `cosine` had before the call
+  /// are considered; -2 stands for all joints.
   int sharpestJoint(double& cosine) const;
 
   /// Residual over force scale beyond which a step is not solved, however small the increment: inertia of very short
