@@ -29,8 +29,13 @@ void ClothPart::findEntries(const SharedMatrix& matrix)
   for (int j = 0; j < points(); ++j)
     for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
       if (const int i = blocks.rows()[k]; isFree(i) && isFree(j))
-        for (int c = 0; c < 3; ++c)
-          block_entries_[3 * k + c] = matrix.index(base(i) + (i == j ? c : 0), base(j) + c);
+        for (int c = 0, at = 0; c < 3; ++c)
+        {
+          at = i == j  ? matrix.diagonal(base(j) + c)
+               : c > 0 ? matrix.inNextColumn(at, base(i), base(j) + c - 1)
+                       : matrix.index(base(i), base(j));
+          block_entries_[3 * k + c] = at;
+        }
   constant_entries_.clear();
   const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
   for (int i = 0; constant && i < points(); ++i)

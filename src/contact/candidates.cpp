@@ -37,6 +37,9 @@ bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const C
 void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
                        const Motion& motion, double gap, double margin, double turn)
 {
+  margin_ = margin;
+  start_ = motion.x;
+  way_ = motion.x_end - motion.x;
   low_ = motion.x.cwiseMin(motion.x_end).array() - margin;
   high_ = motion.x.cwiseMax(motion.x_end).array() + margin;
   boxes_.resize(surface.segments.size());
@@ -105,7 +108,11 @@ void Candidates::findOnSolid(const ContactSurface& surface, int solid, const Sol
 
 bool Candidates::holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const
 {
-  if (!built_ || (x.array() < low_.array()).any() || (x.array() > high_.array()).any())
+  if (!built_)
+    return false;
+  const double length2 = way_.squaredNorm();   // of the way of all points
+  const double t = length2 > 0.0 ? std::clamp((x - start_).cwiseProduct(way_).sum() / length2, 0.0, 1.0) : 0.0;
+  if (((x - start_ - t * way_).array().abs() > margin_).any())
     return false;
   for (std::size_t k = 0; k < solids.size(); ++k)
     if ((solids[k].position - solids_[k].position).norm() > shift_[k] || angleBetween(solids[k], solids_[k]) > turn_[k])

@@ -20,8 +20,8 @@ public:
   };
   using Motion = SurfaceMotion;
 
-  /// All pairs that may come within `gap` of each other while no coordinate leaves the boxes that the points' motions
-  /// fill by more than `margin` [m], and no solid its own motion by more than `margin` and `turn` [rad].
+  /// Finds all pairs that may come within `gap` of each other while all points are at one instant of the motion, but
+  /// for at most `margin` [m] in each coordinate, and solids leave the motion by at most `margin` and `turn` [rad].
   void build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
              const Motion& motion, double gap, double margin, double turn);
   /// Forgets everything: the surface has other pieces from now on.
@@ -30,6 +30,8 @@ public:
     built_ = false;
     sheets_.forget();
   }
+  /// Returns true if the pairs are all that may come within the gap of each other at x. If that is true of two places,
+  /// it is true of all places between.
   bool holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
 
   const std::vector<GridPairs::Pair>& pairs() const { return pairs_; }
@@ -41,6 +43,8 @@ private:
                    double gap, double margin);
 
   bool built_ = false;
+  double margin_ = 0.0;
+  Eigen::Matrix3Xd start_, way_;   ///< of points: where the motion starts, and how far it leads
   Eigen::Matrix3Xd low_, high_;
   std::vector<Pose> solids_;
   std::vector<double> shift_, turn_;   ///< from solids_ up to which the candidates hold

@@ -19,11 +19,18 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   const Candidates* candidates = &near_;
   if (!near_.holdsFor(x, poses) || !near_.holdsFor(x_end, poses_end))
   {
-    swept_.build(surface, sheets_, solids, {x, x_end, poses, poses_end}, options.gap, 0.0, 0.0);
-    candidates = &swept_;
-    // Triangles would find all their neighbours in a wide margin, and examine them in each evaluation.
-    const double moved = (x_end - x).colwise().norm().maxCoeff(), most = sheets_.empty() ? 20.0 : 1.0;
-    margin_ = std::min(std::max(options.gap, 2.0 * moved), most * options.gap);
+    constexpr double kLongest = 10.0;   // gaps: after longer ways, evaluations would examine too many pairs
+    constexpr double kOfSheets = 0.4;   // gaps: in a wider margin, triangles find too many of their neighbours
+    const SurfaceMotion motion{x, x_end, poses, poses_end};
+    const double moved = (x_end - x).colwise().norm().maxCoeff();
+    margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options.gap, 1.0, 20.0) : kOfSheets) * options.gap;
+    if (moved <= kLongest * options.gap)
+      near_.build(surface, sheets_, solids, motion, options.gap, margin_, kTurnMargin);
+    else
+    {
+      swept_.build(surface, sheets_, solids, motion, options.gap, 0.0, 0.0);
+      candidates = &swept_;
+    }
   }
   double share = 1.0;
   ApproachLimit limit;

@@ -13,8 +13,6 @@ namespace slender {
 
 namespace {
 
-constexpr double kTurnMargin = 0.02;   // [rad] a solid may turn before candidates are sought again
-
 [[noreturn]] void refuse(const std::string& why) { throw std::invalid_argument("contact: " + why); }
 
 void checkTriangle(const ContactSurface& surface, std::size_t number)

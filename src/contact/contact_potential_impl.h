@@ -18,6 +18,7 @@
 namespace slender {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kTurnMargin = 0.02;   ///< [rad] a solid may turn before candidates are sought again
 
 template <class To, class From>
 void copyFour(To& to, const From& from)

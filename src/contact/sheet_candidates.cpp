@@ -1,7 +1,7 @@
 #include "sheet_candidates.h"
 
 #include <cmath>
-#include <tuple>
+#include <cstdint>
 
 #include "slender_sim/contact/distance.h"
 #include "pair_gap.h"
@@ -94,7 +94,12 @@ void SheetCandidates::findPairs(const ContactSurface& surface, const SheetPieces
     points_[p.point] = Kdop::swept(motion.x.col(p.point).data(), end.data(), p.radius + around);
     strays_[p.point] = (end - motion.x.col(p.point)).norm() + around;
   }
-  takeBalls(surface, pieces, motion.x);
+  edges_.resize(pieces.edges.size());
+  for (std::size_t i = 0; i < edges_.size(); ++i)
+  {
+    edges_[i] = points_[pieces.edges[i].a];
+    edges_[i].include(points_[pieces.edges[i].b]);
+  }
   for (std::size_t i = 0; i < volumes_.size(); ++i)
   {
     const auto& corner = pieces.elements[i].corner;
@@ -107,32 +112,9 @@ void SheetCandidates::findPairs(const ContactSurface& surface, const SheetPieces
   tree_.selfPairs(found_);
   for (const KdopTree::Pair& p : found_)
     testElements(surface, pieces, motion.x, p.first, p.second);
-  std::sort(pairs_.begin(), pairs_.end(), [](const Pair& a, const Pair& b) {
-    return std::make_tuple(!a.edges, a.first, a.second) < std::make_tuple(!b.edges, b.first, b.second);
-  });
-}
-
-/// Balls around edges and triangles at the start of the motion, which hold them while they move with the mean.
-void SheetCandidates::takeBalls(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x)
-{
-  edge_balls_.resize(pieces.edges.size());
-  for (std::size_t i = 0; i < pieces.edges.size(); ++i)
-  {
-    const SheetPieces::Edge& e = pieces.edges[i];
-    const double stray = e.radius + std::max(strays_[e.a], strays_[e.b]);
-    edge_balls_[i] = {0.5 * (x.col(e.a) + x.col(e.b)), 0.5 * (x.col(e.a) - x.col(e.b)).norm() + stray, stray};
-  }
-  triangle_balls_.resize(surface.triangles.size());
-  for (std::size_t i = 0; i < surface.triangles.size(); ++i)
-  {
-    const ContactTriangle& t = surface.triangles[i];
-    const auto& c = t.corner;
-    const double stray = t.half_thickness + std::max({strays_[c[0]], strays_[c[1]], strays_[c[2]]});
-    const Eigen::Vector3d middle = (x.col(c[0]) + x.col(c[1]) + x.col(c[2])) / 3.0;
-    const double far2 = std::max({(x.col(c[0]) - middle).squaredNorm(), (x.col(c[1]) - middle).squaredNorm(),
-                                  (x.col(c[2]) - middle).squaredNorm()});
-    triangle_balls_[i] = {middle, std::sqrt(far2) + stray, stray};
-  }
+  const auto rank = [](const Pair& p) { return (static_cast<std::int64_t>(p.first) << 32) + p.second; };
+  std::sort(pairs_.begin(), pairs_.end(),
+            [&](const Pair& a, const Pair& b) { return a.edges != b.edges ? a.edges : rank(a) < rank(b); });
 }
 
 void SheetCandidates::testElements(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
@@ -146,17 +128,16 @@ void SheetCandidates::testElements(const ContactSurface& surface, const SheetPie
   for (int k = 0; k < 3; ++k)
   {
     if (e.point[k] >= 0 && f.corners == 3)
-      testPoint(surface, pieces, x, e.point[k], pieces.triangleOf(b));
+      testPoint(surface, pieces, x, e.point[k], b);
     if (f.point[k] >= 0 && e.corners == 3)
-      testPoint(surface, pieces, x, f.point[k], pieces.triangleOf(a));
+      testPoint(surface, pieces, x, f.point[k], a);
   }
 }
 
 void SheetCandidates::testEdges(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
                                 int a, int b)
 {
-  const Ball &p = edge_balls_[a], &q = edge_balls_[b];
-  if (p.misses(q))
+  if (!edges_[a].overlaps(edges_[b]))
     return;
   const SheetPieces::Edge &e = pieces.edges[a], &f = pieces.edges[b];
   if (e.a == f.a || e.a == f.b || e.b == f.a || e.b == f.b || (e.driven && f.driven))
@@ -165,17 +146,18 @@ void SheetCandidates::testEdges(const ContactSurface& surface, const SheetPieces
     return segmentDistance(y.col(e.a - first), y.col(e.b - first), y.col(f.a - first), y.col(f.b - first));
   };
   Pair pair{true, a, b, e.radius + f.radius, 1.0};
-  if (distance(x, 0) <= p.stray + q.stray && fitToRest(surface, e.object, f.object, gap_, distance, pair))
+  const double stray = std::max(strays_[e.a], strays_[e.b]) + std::max(strays_[f.a], strays_[f.b]);
+  if (distance(x, 0) <= pair.thickness + stray && fitToRest(surface, e.object, f.object, gap_, distance, pair))
     pairs_.push_back(pair);
 }
 
 void SheetCandidates::testPoint(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
-                                int number, int triangle)
+                                int number, int element)
 {
   const SheetPieces::Point& p = pieces.points[number];
-  const Ball &q = triangle_balls_[triangle], ball{x.col(p.point), p.radius + strays_[p.point], 0.0};
-  if (q.misses(ball))
+  if (!points_[p.point].overlaps(volumes_[element]))
     return;
+  const int triangle = pieces.triangleOf(element);
   const ContactTriangle& t = surface.triangles[triangle];
   const auto& c = t.corner;
   if (p.point == c[0] || p.point == c[1] || p.point == c[2] || (p.driven && t.driven == 7))
@@ -184,7 +166,8 @@ void SheetCandidates::testPoint(const ContactSurface& surface, const SheetPieces
     return pointTriangleDistance(y.col(p.point - first), y.col(c[0] - first), y.col(c[1] - first), y.col(c[2] - first));
   };
   Pair pair{false, number, triangle, p.radius + t.half_thickness, 1.0};
-  if (distance(x, 0) <= ball.reach + q.stray && fitToRest(surface, p.object, t.object, gap_, distance, pair))
+  const double stray = strays_[p.point] + std::max({strays_[c[0]], strays_[c[1]], strays_[c[2]]});
+  if (distance(x, 0) <= pair.thickness + stray && fitToRest(surface, p.object, t.object, gap_, distance, pair))
     pairs_.push_back(pair);
 }
 

@@ -51,25 +51,12 @@ private:
   void buildTree(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
   void findPairs(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion,
                  const Slack& slack);
-  void takeBalls(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
   void testElements(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int a, int b);
   void testEdges(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int a, int b);
   void testPoint(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int number,
-                 int triangle);
+                 int element);
   void findOnSolid(const ContactSurface& surface, const std::vector<SheetPieces::Face>& faces, int solid,
                    const SolidPieces& pieces, const SurfaceMotion& motion, const Slack& slack);
-
-  struct Ball
-  {
-    Eigen::Vector3d middle;
-    double reach;   ///< radius [m], what the surface adds included
-    double stray;   ///< that part of it: how far from the piece another one may be felt
-    bool misses(const Ball& b) const
-    {
-      const double sum = reach + b.reach;
-      return (middle - b.middle).squaredNorm() > sum * sum;
-    }
-  };
 
   bool tree_built_ = false;
   double gap_ = 0.0;
@@ -77,9 +64,8 @@ private:
   Eigen::Matrix3Xd centers_;
   std::vector<int> groups_;
   std::vector<char> touching_, active_;
-  std::vector<Kdop> volumes_, points_;
+  std::vector<Kdop> volumes_, points_, edges_;   ///< of elements, points and edges
   std::vector<double> strays_;   ///< of points: how far they get from where the mean motion takes them, and the margin
-  std::vector<Ball> edge_balls_, triangle_balls_;
   std::vector<KdopTree::Pair> found_;
   std::vector<Pair> pairs_;
   std::vector<OnSolid> on_solids_;

@@ -12,7 +12,7 @@ namespace slender {
 
 void Equations::setParts(const std::vector<Part*>& parts)
 {
-  pattern_valid_ = pattern_valid_ && parts == parts_;
+  parts_valid_ = parts_valid_ && parts == parts_;
   parts_ = parts;
 }
 
@@ -48,7 +48,7 @@ void Equations::countPoints()
 void Equations::numberUnknowns()
 {
   for (Part* part : parts_)
-    pattern_valid_ = part->numberUnknowns() && pattern_valid_;
+    parts_valid_ = part->numberUnknowns() && parts_valid_;
 }
 
 // ---- configurations
@@ -132,7 +132,7 @@ void Equations::beginSubstep(double fraction)
   exact_ = false;
   for (Part* part : parts_)
   {
-    pattern_valid_ = pattern_valid_ && part->island == this;   // another island has numbered its unknowns
+    parts_valid_ = parts_valid_ && part->island == this;   // another island has numbered its unknowns
     part->island = this;
   }
   numberUnknowns();

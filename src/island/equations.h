@@ -148,7 +148,9 @@ private:
   void take();
   void takeFirst();
   void makeRoom(const ContactTerm& term);
+  void takeNewKeys();
   void buildPattern();
+  void noteParts();
   std::vector<int> numberBlocks();
   SharedMatrix::Solver chooseSolver();
   bool sweepsPay();
@@ -172,13 +174,18 @@ private:
   SharedMatrix matrix_;
   SchurComplement schur_;             ///< of the averages of coupled parts
   std::vector<double> constrained_;   ///< direction of all coupled unknowns
-  bool pattern_valid_ = false, exact_ = false;
+  /// The matrix knows what parts couple by themselves, and has room for all contacts of keys_.
+  bool parts_valid_ = false, keys_valid_ = false;
+  bool exact_ = false;
   HessianShift shift_;   ///< of the last evaluation with a Hessian
   int linear_iterations_ = 0;
   int blocks_ = 0;                         ///< of the matrix
   std::vector<std::pair<int, int>> met_;   ///< blocks of which parts touch each other
   std::vector<char> turns_of_triples_;     ///< result of Part::addTriples() for the coupled parts
   std::vector<Key> keys_, keys_before_;    ///< room for contacts that the pattern has, sorted
+  std::vector<Key> new_keys_;              ///< of present contacts that are not in keys_
+  std::vector<Key> merged_keys_;
+  std::vector<char> coupled_;
 
   std::unique_ptr<ContactPotential> contact_;
   SurfacePotential* attraction_ = nullptr;

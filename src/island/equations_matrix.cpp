@@ -1,5 +1,6 @@
 // Several parts and their contact as one system for Newton's method: forces, the shared matrix, and its solution.
 #include <algorithm>
+#include <iterator>
 
 #include "island/equations_loops.h"
 
@@ -11,11 +12,21 @@ void Equations::makeRoom(const ContactTerm& term)
 {
   const Key key{term.point[0], term.point[1],      term.point[2],     term.point[3],
                 term.solid,    term.turn[0].point, term.turn[1].point};
-  const auto at = std::lower_bound(keys_.begin(), keys_.end(), key);
-  if (at != keys_.end() && *at == key)
+  if (!std::binary_search(keys_.begin(), keys_.end(), key))
+    new_keys_.push_back(key);
+}
+
+void Equations::takeNewKeys()
+{
+  if (new_keys_.empty())
     return;
-  keys_.insert(at, key);
-  pattern_valid_ = false;
+  keys_valid_ = false;
+  std::sort(new_keys_.begin(), new_keys_.end());
+  merged_keys_.clear();
+  std::merge(keys_.begin(), keys_.end(), new_keys_.begin(), std::unique(new_keys_.begin(), new_keys_.end()),
+             std::back_inserter(merged_keys_));
+  keys_.swap(merged_keys_);
+  new_keys_.clear();
 }
 
 /// Sorts the contacts by parts, and makes room in the pattern for those that couple unknowns.
@@ -32,6 +43,7 @@ void Equations::take()
     else
       makeRoom(term);
   });
+  takeNewKeys();
   for (const ContactRow& row : contact_->rows())
     if (row.point[3] < 0)   // of a segment or a triangle and a solid
       partOf(row.point[0]).own_rows.push_back(&row);
@@ -41,11 +53,11 @@ void Equations::take()
 /// state and not from the steps before.
 void Equations::takeFirst()
 {
-  const bool valid = pattern_valid_;
+  const bool valid = keys_valid_;
   keys_before_.swap(keys_);
   keys_.clear();
   take();
-  pattern_valid_ = valid && keys_ == keys_before_;
+  keys_valid_ = valid && keys_ == keys_before_;
 }
 
 void Equations::addForce(const ContactTerm& term)
@@ -137,10 +149,15 @@ void Equations::columnsOf(const ContactRow& contact, bool whole, Part::Columns& 
   }
 }
 
-void Equations::buildPattern()
+/// Notes what parts couple by themselves, unless the matrix knows it already.
+void Equations::noteParts()
 {
+  coupled_.clear();
   for (Part* part : parts_)
+  {
+    coupled_.push_back(part->coupled);
     part->coupled = part->joined();
+  }
   for (const Key& key : keys_)
   {
     for (int p = 0; p < 4; ++p)
@@ -148,6 +165,13 @@ void Equations::buildPattern()
         partOf(key[p]).coupled = true;
     if (RigidPart* body = bodyOf(key[4]))
       body->coupled = true;
+  }
+  const bool same = std::equal(parts_.begin(), parts_.end(), coupled_.begin(),
+                               [](const Part* part, char coupled) { return part->coupled == (coupled != 0); });
+  if (parts_valid_ && same)
+  {
+    matrix_.beginAgain();
+    return;
   }
   int unknowns = 0;
   for (Part* part : parts_)
@@ -159,6 +183,13 @@ void Equations::buildPattern()
   for (Part* part : parts_)
     if (part->coupled)
       part->notePattern(matrix_);
+  matrix_.keepNoted();
+  parts_valid_ = true;
+}
+
+void Equations::buildPattern()
+{
+  noteParts();
   for (const Key& key : keys_)
   {
     ContactTerm term;
@@ -178,7 +209,7 @@ void Equations::buildPattern()
   }
   const std::vector<int> blocks = numberBlocks();
   matrix_.finish(chooseSolver(), blocks, turns_of_triples_);
-  pattern_valid_ = true;
+  keys_valid_ = true;
   for (Part* part : parts_)
     if (part->coupled)
       part->findEntries(matrix_);
@@ -312,7 +343,7 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
       sum.potential += attraction_->evaluate(points_, with_hessian);
     take();
   }
-  if (!pattern_valid_)
+  if (!parts_valid_ || !keys_valid_)
     buildPattern();
   forParts([&](Part& part) { part.evaluate(with_hessian, shift); });
   for (const Part* part : parts_)

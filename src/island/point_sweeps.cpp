@@ -15,15 +15,20 @@ void PointSweeps::setPattern(const std::vector<int>& starts, const std::vector<i
   {
     column.clear();
     for (int k = starts[3 * j]; k < starts[3 * j + 3]; ++k)
-      column.push_back(rows[k] / 3);
+      if (column.empty() || column.back() != rows[k] / 3)
+        column.push_back(rows[k] / 3);
     std::sort(column.begin(), column.end());
     column.erase(std::unique(column.begin(), column.end()), column.end());
     for (int c = 0; c < 3; ++c)
+    {
+      std::size_t at = 0;
       for (int k = starts[3 * j + c]; k < starts[3 * j + c + 1]; ++k)
       {
-        const auto at = std::lower_bound(column.begin(), column.end(), rows[k] / 3) - column.begin();
+        while (column[at] != rows[k] / 3)
+          ++at;
         places_[k] = 9 * (block_starts.back() + static_cast<int>(at)) + 3 * c + rows[k] % 3;
       }
+    }
     block_rows.insert(block_rows.end(), column.begin(), column.end());
     block_starts.push_back(static_cast<int>(block_rows.size()));
   }

@@ -1,15 +1,55 @@
 #include "island/shared_matrix.h"
 
+#include <iterator>
+
 namespace slender {
 
 void SharedMatrix::begin(int unknowns)
 {
   unknowns_ = unknowns;
+  for (auto* lists : {&columns_, &blocks_below_})
+    if (static_cast<int>(lists->size()) < unknowns_)
+      lists->resize(unknowns_);
+  kept_starts_.assign(static_cast<std::size_t>(unknowns_) + 1, 0);
+  kept_rows_.clear();
+  beginAgain();
+}
+
+void SharedMatrix::beginAgain()
+{
   solution_.assign(unknowns_, 0.0);
-  if (static_cast<int>(columns_.size()) < unknowns_)
-    columns_.resize(unknowns_);
   for (int u = 0; u < unknowns_; ++u)
+  {
     columns_[u].clear();
+    blocks_below_[u].clear();
+  }
+}
+
+void SharedMatrix::keepNoted()
+{
+  noteBlocks();
+  for (int u = 0; u < unknowns_; ++u)
+  {
+    std::vector<int>& noted = columns_[u];
+    std::sort(noted.begin(), noted.end());
+    kept_rows_.insert(kept_rows_.end(), noted.begin(), std::unique(noted.begin(), noted.end()));
+    kept_starts_[u + 1] = static_cast<int>(kept_rows_.size());
+    noted.clear();
+  }
+}
+
+/// Appends the rows of a column that have been noted and kept, each once and in ascending order.
+void SharedMatrix::appendNoted(int column, std::vector<int>& rows)
+{
+  std::vector<int>& noted = columns_[column];
+  const auto kept = kept_rows_.begin() + kept_starts_[column], kept_end = kept_rows_.begin() + kept_starts_[column + 1];
+  if (noted.empty())
+  {
+    rows.insert(rows.end(), kept, kept_end);
+    return;
+  }
+  std::sort(noted.begin(), noted.end());
+  std::set_union(kept, kept_end, noted.begin(), std::unique(noted.begin(), noted.end()), std::back_inserter(rows));
 }
 
 void SharedMatrix::notePairs(const Columns& a, const Columns& b)
@@ -51,9 +91,23 @@ void SharedMatrix::noteBases(const Bases& bases)
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j <= i; ++j)
       if (bases[i] >= 0 && bases[j] >= 0)
-        for (int r = 0; r < 3; ++r)
-          for (int c = 0; c < 3; ++c)
-            note(bases[i] + r, bases[j] + c);
+        blocks_below_[std::min(bases[i], bases[j])].push_back(std::max(bases[i], bases[j]));
+}
+
+/// Contacts that share points have noted most blocks several times.
+void SharedMatrix::noteBlocks()
+{
+  for (int u = 0; u < unknowns_; ++u)
+  {
+    std::vector<int>& blocks = blocks_below_[u];
+    std::sort(blocks.begin(), blocks.end());
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+    for (const int first : blocks)
+      for (int c = 0; c < 3; ++c)
+        for (int r = first == u ? c : 0; r < 3; ++r)
+          columns_[u + c].push_back(first + r);
+    blocks.clear();
+  }
 }
 
 void SharedMatrix::finish(Solver solver, const std::vector<int>& blocks, const std::vector<char>& turns)
@@ -62,13 +116,12 @@ void SharedMatrix::finish(Solver solver, const std::vector<int>& blocks, const s
   cholesky_known_ = false;
   if (unknowns_ == 0)
     return;
+  noteBlocks();
   starts_.assign(1, 0);
   rows_.clear();
   for (int u = 0; u < unknowns_; ++u)
   {
-    std::vector<int>& column = columns_[u];
-    std::sort(column.begin(), column.end());
-    rows_.insert(rows_.end(), column.begin(), std::unique(column.begin(), column.end()));
+    appendNoted(u, rows_);
     starts_.push_back(static_cast<int>(rows_.size()));
   }
   values_.assign(rows_.size(), 0.0);
@@ -265,9 +318,12 @@ void SharedMatrix::addBlocks(const Bases& bases, Block&& block)
       if (bases[i] >= bases[j] && bases[j] >= 0)
       {
         const Eigen::Matrix3d b = block(i, j);
-        for (int c = 0; c < 3; ++c)
+        for (int c = 0, at = 0; c < 3; ++c)
         {
-          const int first = i == j ? c : 0, at = index(bases[i] + first, bases[j] + c);
+          const int first = i == j ? c : 0;
+          at = i == j  ? diagonal(bases[j] + c)
+               : c > 0 ? inNextColumn(at, bases[i], bases[j] + c - 1)
+                       : index(bases[i], bases[j]);
           for (int r = first; r < 3; ++r)
             values[at + r - first] += b(r, c);
         }

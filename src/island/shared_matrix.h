@@ -15,8 +15,9 @@ namespace slender {
 
 /// The sparse symmetric matrix of unknowns that contacts or bodies couple, with its right-hand side and solution.
 ///
-/// For one pattern: begin(), then what couples unknowns by note(), notePairs() and noteBases(), then finish(). For one
-/// matrix: factor() with a function that calls clear() and adds all entries.
+/// For one pattern: begin(), then what couples unknowns by note(), notePairs(), noteRows() and noteBases(), then
+/// finish(). What stays while contacts come and go is noted once: see keepNoted(). For one matrix: factor() with a
+/// function that calls clear() and adds all entries.
 ///
 /// There are three solvers: sparse Cholesky factorisation, conjugate gradients that are preconditioned by the
 /// factorisation of blocks (the matrix without the entries that couple different blocks), and conjugate gradients that
@@ -59,6 +60,9 @@ public:
   /// Everything that these rows contain together.
   void noteRows(const Columns* rows, int count);
   void noteBases(const Bases& bases);
+  /// What has been noted so far remains noted when beginAgain() begins the next pattern of the same unknowns.
+  void keepNoted();
+  void beginAgain();
   /// `blocks`: the number of the block that each unknown belongs to; only `conjugate_gradients` needs it. `turns`: see
   /// PointSweeps; only `sweeps` needs it.
   void finish(Solver solver = Solver::cholesky, const std::vector<int>& blocks = {},
@@ -67,6 +71,13 @@ public:
   Solver solver() const { return solver_; }
   /// Where an entry of the pattern lies among values().
   int index(int a, int b) const;
+  /// Where the entry (a, b + 1) lies, if (a, b) lies at `at`; a > b + 1. In most columns it follows from the pattern.
+  int inNextColumn(int at, int a, int b) const
+  {
+    const int guess = starts_[b + 1] + at - starts_[b] - 1;
+    return guess >= starts_[b + 1] && guess < starts_[b + 2] && rows_[guess] == a ? guess : index(a, b + 1);
+  }
+  int diagonal(int a) const { return starts_[a]; }   ///< Where the entry (a, a) lies.
 
   // ---- values
   void clear() { std::fill(values_.begin(), values_.end(), 0.0); }
@@ -140,6 +151,8 @@ private:
   static void merge(const Columns* rows, int count, MergedRows& merged);
   void addMerged(const MergedRows& merged, const Eigen::Matrix3d& stiffness);
 
+  void noteBlocks();
+  void appendNoted(int column, std::vector<int>& rows);
   template <class Block>
   void addBlocks(const Bases& bases, Block&& block);
   void takeBlocks(const std::vector<int>& blocks);
@@ -153,8 +166,10 @@ private:
   Backoff whole_;
   Backoff swept_;   ///< When to try sweeps. They fail if they need too many iterations.
   int unknowns_ = 0;
-  std::vector<std::vector<int>> columns_;
-  std::vector<int> starts_, rows_;   ///< lower triangle by columns, as SparseCholesky has it
+  std::vector<std::vector<int>> columns_;        ///< what has been noted since begin() or beginAgain()
+  std::vector<std::vector<int>> blocks_below_;   ///< Blocks of 3 x 3 entries: first rows, by first columns.
+  std::vector<int> kept_starts_, kept_rows_;     ///< what keepNoted() keeps
+  std::vector<int> starts_, rows_;               ///< lower triangle by columns, as SparseCholesky has it
   std::vector<double> values_;
   std::vector<double> solution_;
   Solver solver_ = Solver::cholesky;

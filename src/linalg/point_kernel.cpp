@@ -145,7 +145,7 @@ inline __attribute__((always_inline)) void addProducts(Four<Scalar> x, Four<Scal
 }
 
 template <class Scalar>
-void sweepUp(const SweptMatrix<Scalar>& m, const Scalar* p, Scalar* t, Scalar* q)
+void sweepUp(const SweptMatrix<Scalar>& m, const GroupBlocks<Scalar>& b, const Scalar* p, Scalar* t, Scalar* q)
 {
   int k = m.starts[m.points];
   for (int j = m.points; j-- > 0;)
@@ -158,18 +158,24 @@ void sweepUp(const SweptMatrix<Scalar>& m, const Scalar* p, Scalar* t, Scalar* q
     }
     const Four<Scalar> sum = below.sum();
     four(q + 4 * j) = sum;
-    four(t + 4 * j) = times(m.inverse + 12 * static_cast<long>(j), 4, four(p + 4 * j) - sum);
+    const Four<Scalar> solved = times(m.inverse + 12 * static_cast<long>(j), 4, four(p + 4 * j) - sum);
+    four(t + 4 * j) = solved;
+    for (int g = b.starts ? b.starts[j] : 0, end = b.starts ? b.starts[j + 1] : 0; g < end; ++g)
+      four(b.motion + 4 * b.groups[g]) += times(b.transposed + 9 * static_cast<long>(g), 3, solved);
   }
 }
 
 template <class Scalar>
-double sweepDown(const SweptMatrix<Scalar>& m, const Scalar* p, const Scalar* t, Scalar* q)
+double sweepDown(const SweptMatrix<Scalar>& m, const GroupBlocks<Scalar>& b, const Scalar* p, const Scalar* t,
+                 Scalar* q)
 {
   Quad form = {};
   int k = 0;
   for (int j = 0; j < m.points; ++j)
   {
     Four<Scalar>& own = four(q + 4 * j);
+    for (int g = b.starts ? b.starts[j] : 0, end = b.starts ? b.starts[j + 1] : 0; g < end; ++g)
+      own -= times(b.blocks + 9 * static_cast<long>(g), 3, four(b.motion + 4 * b.groups[g]));
     const Four<Scalar> solved = times(m.inverse + 12 * static_cast<long>(j), 4, own);
     for (const int end = m.starts[j + 1]; k < end; ++k)
       four(q + 4 * m.rows[k]) -= times(m.blocks + 9 * static_cast<long>(k), 3, solved);
@@ -204,28 +210,7 @@ void turn(int points, double beta, const Scalar* z, Scalar* p)
 }
 
 template <class Scalar>
-void gather(const GroupBlocks<Scalar>& b, const Scalar* t, Scalar* c)
-{
-  for (int j = 0; j < b.points; ++j)
-    for (int k = b.starts[j]; k < b.starts[j + 1]; ++k)
-    {
-      TransposedProduct<Scalar> product;
-      product.add(b.blocks + 9 * static_cast<long>(k), four(t + 4 * j));
-      four(c + 4 * b.groups[k]) += product.sum();
-    }
-}
-
-template <class Scalar>
-void scatter(const GroupBlocks<Scalar>& b, const Scalar* c, Scalar* q)
-{
-  for (int j = 0; j < b.points; ++j)
-    for (int k = b.starts[j]; k < b.starts[j + 1]; ++k)
-      four(q + 4 * j) -= times(b.blocks + 9 * static_cast<long>(k), 3, four(c + 4 * b.groups[k]));
-}
-
-template <class Scalar>
-constexpr SweepKernels<Scalar> kSweeps = {sweepUp<Scalar>, sweepDown<Scalar>, advance<Scalar>,
-                                          turn<Scalar>,    gather<Scalar>,    scatter<Scalar>};
+constexpr SweepKernels<Scalar> kSweeps = {sweepUp<Scalar>, sweepDown<Scalar>, advance<Scalar>, turn<Scalar>};
 
 /// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the
 /// triangle, then take their part from the rows below.

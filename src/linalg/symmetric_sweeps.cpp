@@ -63,7 +63,7 @@ struct SymmetricSweeps::Impl
   {
     AlignedVector<Scalar> blocks, diagonal, inverse;   ///< as SweptMatrix has them
     AlignedVector<Scalar> x, r, z, p, t, q;
-    AlignedVector<Scalar> group_blocks, groups;   ///< as GroupBlocks has them; a vector of groups
+    AlignedVector<Scalar> group_blocks, transposed_blocks, groups;   ///< as GroupBlocks has them
     /// What a search can take from a residual before rounding errors spoil it.
     static constexpr double kLeast = std::is_same_v<Scalar, float> ? 1e-5 : 1e-13;
 
@@ -116,9 +116,10 @@ struct SymmetricSweeps::Impl
     return {points(), starts_.data(), rows_.data(), s.blocks.data(), s.diagonal.data(), s.inverse.data()};
   }
   template <class Scalar>
-  GroupBlocks<Scalar> groupsOf(const Search<Scalar>& s) const
+  GroupBlocks<Scalar> groupsOf(Search<Scalar>& s) const
   {
-    return {points(), deflation_.starts().data(), deflation_.columns().data(), s.group_blocks.data()};
+    return {deflation_.starts().data(), deflation_.columns().data(), s.group_blocks.data(), s.transposed_blocks.data(),
+            s.groups.data()};
   }
   void leave(PointVector& x);
   template <class Scalar>
@@ -130,8 +131,8 @@ struct SymmetricSweeps::Impl
   template <class Scalar>
   bool begin(Search<Scalar>& s, LinearResult& result);
   template <class Scalar, class Between, class Advanced>
-  SearchEnd iterate(Search<Scalar>& s, double square, double scale, double tolerance, int max_iterations,
-                    LinearResult& result, Between&& between, Advanced&& advanced);
+  SearchEnd iterate(Search<Scalar>& s, const GroupBlocks<Scalar>& groups, double square, double scale, double tolerance,
+                    int max_iterations, LinearResult& result, Between&& between, Advanced&& advanced);
   template <class Scalar>
   SearchEnd negative(const Search<Scalar>& s, double curvature) const;
   template <class Scalar>
@@ -331,7 +332,7 @@ double SymmetricSweeps::Impl::load(Search<Scalar>& s, const PointVector& from, d
   for (int v = 0; v < points(); ++v)
     for (int c = 0; c < 3; ++c)
       s.q[4 * v + c] = (*held_)[order_[v]] ? Scalar(0) : static_cast<Scalar>(from[4 * v + c] / size);
-  kernels.down(matrixOf(s), s.r.data(), s.t.data(), s.q.data());
+  kernels.down(matrixOf(s), {}, s.r.data(), s.t.data(), s.q.data());
   const double square = kernels.advance(matrixOf(s), -1.0, s.t.data(), s.q.data(), s.x.data(), s.r.data(), s.z.data());
   s.p = s.z;
   return square;
@@ -348,37 +349,35 @@ double SymmetricSweeps::Impl::norm(Search<Scalar>& s, const PointVector& r)
   return square >= 0 ? std::sqrt(square) * size : square;
 }
 
-/// Leaves the common motions common_ out of the direction t: takes the forces that they would need from q.
+/// Sets the common motions that are to be left out of the direction t, from what the upward sweep gathered in groups.
 template <class Scalar>
 void SymmetricSweeps::Impl::deflate(Search<Scalar>& s)
 {
-  const SweepKernels<Scalar>& kernels = pointKernels().sweeps<Scalar>();
-  std::fill(s.groups.begin(), s.groups.end(), Scalar(0));
-  kernels.gather(groupsOf(s), s.t.data(), s.groups.data());
   std::copy(s.groups.begin(), s.groups.end(), common_.begin());
   deflation_.solve(common_);
   std::transform(common_.begin(), common_.end(), s.groups.begin(), [](double c) { return static_cast<Scalar>(c); });
-  kernels.scatter(groupsOf(s), s.groups.data(), s.q.data());
 }
 
 /// Iterates from what load() has left, until the norm is `tolerance` times `scale`. In the norm of D, the matrix is
 /// (D + L)^-1 A (D + L^T)^-1, and its product with p is t + (D + L)^-1 (p - D t) with t = (D + L^T)^-1 p, where
-/// p - D t = L^T t. `between` adds to this L^T t what a larger matrix has beside A; `advanced` follows each step along
-/// t.
+/// p - D t = L^T t. What the common motions of `groups` would need is taken from this L^T t.
+/// `between` sets them, or adds to L^T t what a larger matrix has beside A. `advanced` follows each step along t.
 template <class Scalar, class Between, class Advanced>
-SymmetricSweeps::Impl::SearchEnd SymmetricSweeps::Impl::iterate(Search<Scalar>& s, double square, double scale,
-                                                                double tolerance, int max_iterations,
-                                                                LinearResult& result, Between&& between,
-                                                                Advanced&& advanced)
+SymmetricSweeps::Impl::SearchEnd SymmetricSweeps::Impl::iterate(Search<Scalar>& s, const GroupBlocks<Scalar>& groups,
+                                                                double square, double scale, double tolerance,
+                                                                int max_iterations, LinearResult& result,
+                                                                Between&& between, Advanced&& advanced)
 {
   const SweepKernels<Scalar>& kernels = pointKernels().sweeps<Scalar>();
   const SweptMatrix<Scalar> matrix = matrixOf(s);
   double norm = std::sqrt(square) / scale;
   for (; norm > tolerance && result.iterations < max_iterations && !stepsInterrupted(); ++result.iterations)
   {
-    kernels.up(matrix, s.p.data(), s.t.data(), s.q.data());
+    if (groups.starts)
+      std::fill(s.groups.begin(), s.groups.end(), Scalar(0));
+    kernels.up(matrix, groups, s.p.data(), s.t.data(), s.q.data());
     between();
-    const double curvature = kernels.down(matrix, s.p.data(), s.t.data(), s.q.data());
+    const double curvature = kernels.down(matrix, groups, s.p.data(), s.t.data(), s.q.data());
     if (!(curvature > 0))
       return negative(s, curvature);
     const double alpha = square / curvature;
@@ -415,6 +414,11 @@ SymmetricSweeps::Impl::SearchEnd SymmetricSweeps::Impl::refine(Search<Scalar>& s
   constexpr double kLeastGain = 0.3;
   constexpr double kMargin = 0.5;   // A search that stops just below the tolerance would have to be repeated.
   s.group_blocks.assign(deflation_.blocks().begin(), deflation_.blocks().end());
+  s.transposed_blocks.resize(s.group_blocks.size());
+  for (std::size_t k = 0; k + 9 <= s.group_blocks.size(); k += 9)
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r)
+        s.transposed_blocks[k + 3 * c + r] = s.group_blocks[k + 3 * r + c];
   s.groups.resize(common_.size());
   for (double before = std::numeric_limits<double>::infinity();;)
   {
@@ -434,7 +438,7 @@ SymmetricSweeps::Impl::SearchEnd SymmetricSweeps::Impl::refine(Search<Scalar>& s
     std::fill(common_sum_.begin(), common_sum_.end(), 0.0);
     const double least = std::max(kMargin * tolerance, Search<Scalar>::kLeast * result.residual);
     const SearchEnd end = iterate(
-        s, square, result.scale / size, least, max_iterations, result, [&] { deflate(s); },
+        s, groupsOf(s), square, result.scale / size, least, max_iterations, result, [&] { deflate(s); },
         [&](double alpha) {
           for (std::size_t i = 0; i < common_.size(); ++i)
             common_sum_[i] += alpha * common_[i];
@@ -508,7 +512,7 @@ LinearResult SymmetricSweeps::Impl::solve(const ConstrainedCholesky& constraints
     return result;
   result.scale = std::max(std::min(reference, least / tolerance * std::sqrt(square)), kRounding * reference);
   const SearchEnd end = iterate(
-      double_, square, result.scale, tolerance, max_iterations, result,
+      double_, {}, square, result.scale, tolerance, max_iterations, result,
       [&] {
         fromVisits(double_.t, residual_);
         std::fill(product_.begin(), product_.end(), 0.0);

@@ -112,6 +112,34 @@ struct Moves
   }
 };
 
+/// The pairs that stepLimit() finds serve evaluations, too, while everything stays near the way.
+TEST(ContactSheetMotion, NoPairIsMissedNearAWay)
+{
+  Random random(11);
+  int touching = 0;
+  for (int k = 0; k < 60; ++k)
+  {
+    const Scene s = heap(random);
+    const Moves moves(random, s, 0.05);
+    constexpr double kEnd = 0.1;   // The way is a few gaps long, so that its pairs are kept.
+    ContactPotential p = s.potential();
+    const double end = kEnd * p.stepLimit(s.x, moves.points(s, kEnd), s.solids, moves.poses(s, kEnd));
+    for (int i = 0; i < 4; ++i)
+    {
+      Eigen::Matrix3Xd near = moves.points(s, random.uniform(0.9, 1.0) * end);
+      for (Eigen::Index j = 0; j < near.cols(); ++j)
+        near.col(j) += random.vector(0.3 * kMotionGap);
+      const std::vector<Pose> poses = moves.poses(s, end);
+      ContactPotential fresh = s.potential();
+      const double energy = fresh.evaluate(near, poses, false);
+      EXPECT_EQ(p.evaluate(near, poses, false), energy) << "case " << k;
+      EXPECT_EQ(p.terms().size(), fresh.terms().size());
+      touching += std::isfinite(energy) && energy > 0.0;
+    }
+  }
+  EXPECT_GT(touching, 20);
+}
+
 /// Whatever the motion: up to the limit a fifth of the distance that there was remains, by the independent check.
 TEST(ContactSheetMotion, NothingPassesUpToTheLimit)
 {

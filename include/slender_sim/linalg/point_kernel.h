@@ -30,13 +30,14 @@ struct SweptMatrix
   const Scalar *blocks = nullptr, *diagonal = nullptr, *inverse = nullptr;
 };
 
-/// Blocks of 3 x 3 between points and groups of points. Those of point i are starts[i] .. starts[i + 1] - 1.
+/// A matrix B of blocks of 3 x 3 between points and groups of points, and a vector c of groups. The blocks of point i
+/// are starts[i] .. starts[i + 1] - 1. Without `starts` there are no groups.
 template <class Scalar>
 struct GroupBlocks
 {
-  int points = 0;
   const int *starts = nullptr, *groups = nullptr;
-  const Scalar* blocks = nullptr;
+  const Scalar *blocks = nullptr, *transposed = nullptr;   ///< of B, and each of them transposed
+  Scalar* motion = nullptr;                                ///< c, four numbers per group
 };
 
 /// What an iteration of conjugate gradients with symmetric sweeps consists of. Vectors have four numbers per point, the
@@ -44,19 +45,17 @@ struct GroupBlocks
 template <class Scalar>
 struct SweepKernels
 {
-  /// t = (D + L^T)^-1 p, q = L^T t.
-  void (*up)(const SweptMatrix<Scalar>& matrix, const Scalar* p, Scalar* t, Scalar* q);
-  /// q := t + (D + L)^-1 q. Returns p . q.
-  double (*down)(const SweptMatrix<Scalar>& matrix, const Scalar* p, const Scalar* t, Scalar* q);
+  /// t = (D + L^T)^-1 p, q = L^T t, c += B^T t.
+  void (*up)(const SweptMatrix<Scalar>& matrix, const GroupBlocks<Scalar>& groups, const Scalar* p, Scalar* t,
+             Scalar* q);
+  /// q := t + (D + L)^-1 (q - B c). Returns p . q.
+  double (*down)(const SweptMatrix<Scalar>& matrix, const GroupBlocks<Scalar>& groups, const Scalar* p, const Scalar* t,
+                 Scalar* q);
   /// x += alpha t, r -= alpha q, z = D r. Returns r . z.
   double (*advance)(const SweptMatrix<Scalar>& matrix, double alpha, const Scalar* t, const Scalar* q, Scalar* x,
                     Scalar* r, Scalar* z);
   /// p := z + beta p.
   void (*turn)(int points, double beta, const Scalar* z, Scalar* p);
-  /// c += B^T t.
-  void (*gather)(const GroupBlocks<Scalar>& b, const Scalar* t, Scalar* c);
-  /// q -= B c.
-  void (*scatter)(const GroupBlocks<Scalar>& b, const Scalar* c, Scalar* q);
 };
 
 struct PointKernels
