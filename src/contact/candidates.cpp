@@ -19,19 +19,26 @@ bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const Cont
   if (a.prescribed() && b.prescribed())
     return false;
   if (a.object == b.object)
-    return surface.objects[a.object].self && !contactNeighbours(a, b, surface.objects[a.object], gap);
+    return surface.objects[a.object].self && contactShare(a, b, surface.objects[a.object], gap) > 0.0;
   return surface.objects[a.object].others && surface.objects[b.object].others;
 }
 
 }   // namespace
 
-bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
+double contactShare(double along, double radii, double gap)
+{
+  constexpr double kMet = 1e-6;
+  const double share = along / (0.5 * M_PI * (radii + gap));
+  return share > kMet ? std::min(1.0, share) : 0.0;
+}
+
+double contactShare(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
 {
   const ContactSegment &first = a.start <= b.start ? a : b, &second = a.start <= b.start ? b : a;
-  double apart = second.start - (first.start + first.length);
+  double along = second.start - (first.start + first.length);
   if (curve.closed)
-    apart = std::min(apart, curve.curve_length + first.start - (second.start + second.length));
-  return apart < 0.5 * M_PI * (a.radius + b.radius) + gap;
+    along = std::min(along, curve.curve_length + first.start - (second.start + second.length));
+  return contactShare(along, a.radius + b.radius, gap);
 }
 
 void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
