@@ -14,15 +14,6 @@ double angleBetween(const Pose& a, const Pose& b)
   return rotationVector(a.orientation * b.orientation.conjugate()).norm();
 }
 
-bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap)
-{
-  if (a.prescribed() && b.prescribed())
-    return false;
-  if (a.object == b.object)
-    return surface.objects[a.object].self && contactShare(a, b, surface.objects[a.object], gap) > 0.0;
-  return surface.objects[a.object].others && surface.objects[b.object].others;
-}
-
 }   // namespace
 
 double contactShare(double along, double radii, double gap)
@@ -58,7 +49,7 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   if (std::any_of(surface.objects.begin(), surface.objects.end(),
                   [](const ContactObject& o) { return o.self || o.others; }))
     for (const GridPairs::Pair& p : grid_.find(boxes_))
-      if (mayTouch(surface, surface.segments[p.first], surface.segments[p.second], gap))
+      if (mayMeet(surface, surface.segments[p.first], surface.segments[p.second], gap))
         pairs_.push_back(p);
   on_solids_.clear();
   solids_ = motion.solids;
@@ -73,6 +64,29 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   if (!sheets.empty())
     sheets_.build(surface, sheets, solids, motion, {gap, margin, shift_, turn_});
   built_ = true;
+}
+
+bool Candidates::mayMeet(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b,
+                         double gap) const
+{
+  if (a.prescribed() && b.prescribed())
+    return false;
+  const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
+  if (a.object != b.object)
+    return c.others && d.others;
+  const double share = c.self ? contactShare(a, b, c, gap) : 0.0;
+  if (share == 0.0 || share == 1.0)
+    return share == 1.0;
+  // Balls around near segments of one curve: their boxes overlap although the curve is straight.
+  double reach = share * (a.coreRadius() + b.coreRadius() + gap);
+  const auto middle = [&](const ContactSegment& s) -> Eigen::Vector3d {
+    const Eigen::Vector3d from = 0.5 * (low_.col(s.a) + high_.col(s.a)), to = 0.5 * (low_.col(s.b) + high_.col(s.b));
+    const double around =
+        std::max((high_.col(s.a) - low_.col(s.a)).squaredNorm(), (high_.col(s.b) - low_.col(s.b)).squaredNorm());
+    reach += 0.5 * ((to - from).norm() + std::sqrt(around));
+    return 0.5 * (from + to);
+  };
+  return (middle(a) - middle(b)).norm() <= reach;
 }
 
 void Candidates::findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,

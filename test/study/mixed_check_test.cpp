@@ -90,8 +90,8 @@ TEST(MixedCheck, FindsBendsThatClose)
 {
   expectFound(
       "rods: [{centerline: {polyline: {points: [[0.05, 0, 0], [0, 0, 0], [0, 0, 0.006], [0.05, 0, 0.006]]}}, "
-      "cross_section: {radius: 0.005}, material: {density: 1000, youngs_modulus: 1.0e4, poissons_ratio: 0.4}, "
-      "contact: {self: true}, grasps: {a: {edges: [0]}}}]\n",
+      "cross_section: {radius: 0.005}, material: {density: 1000, youngs_modulus: 1.0e5, poissons_ratio: 0.4}, "
+      "damping: {stiffness: 0.02}, contact: {self: true}, grasps: {a: {edges: [0]}}}]\n",
       "self: true", "self: false");
 }
 
