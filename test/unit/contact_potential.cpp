@@ -86,6 +86,21 @@ TEST(ContactPotential, ABendNoTighterThanItsRadiusTouchesNothing)
   }
 }
 
+/// Edges of a curve that is compressed come near each other lengthwise.
+TEST(ContactPotential, ACurveIsNotCompressedToHalfOfItsLength)
+{
+  for (double length : {0.02, 0.1, 0.18})
+    for (const auto& [share, touches] : {std::make_pair(0.65, false), {0.56, true}, {0.5, true}})
+    {
+      ContactCase c;
+      addCurve(c.surface, c.x, nodesBetween({0, 0, 0}, {3 * length, 0, 0}, 3), kCurveRadius);
+      ContactPotential p = c.potential();
+      const double energy = p.evaluate(share * c.x, {}, false);
+      EXPECT_EQ(energy > 0.0, touches) << length << " " << share;
+      EXPECT_EQ(std::isfinite(energy), share > 0.5) << length << " " << share;
+    }
+}
+
 TEST(ContactPotential, ForceInABendIsTheGradient)
 {
   for (double length : {0.1, 0.3, 1.0})   // of the curve's radius
