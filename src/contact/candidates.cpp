@@ -14,24 +14,22 @@ double angleBetween(const Pose& a, const Pose& b)
   return rotationVector(a.orientation * b.orientation.conjugate()).norm();
 }
 
-bool mayTouch(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap)
-{
-  if (a.prescribed() && b.prescribed())
-    return false;
-  if (a.object == b.object)
-    return surface.objects[a.object].self && !contactNeighbours(a, b, surface.objects[a.object], gap);
-  return surface.objects[a.object].others && surface.objects[b.object].others;
-}
-
 }   // namespace
 
-bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
+double contactShare(double along, double radii, double gap)
+{
+  constexpr double kMet = 1e-6;
+  const double share = along / (0.5 * M_PI * (radii + gap));
+  return share > kMet ? std::min(1.0, share) : 0.0;
+}
+
+double contactShare(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap)
 {
   const ContactSegment &first = a.start <= b.start ? a : b, &second = a.start <= b.start ? b : a;
-  double apart = second.start - (first.start + first.length);
+  double along = second.start - (first.start + first.length);
   if (curve.closed)
-    apart = std::min(apart, curve.curve_length + first.start - (second.start + second.length));
-  return apart < 0.5 * M_PI * (a.radius + b.radius) + gap;
+    along = std::min(along, curve.curve_length + first.start - (second.start + second.length));
+  return contactShare(along, a.radius + b.radius, gap);
 }
 
 void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
@@ -54,7 +52,7 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   if (std::any_of(surface.objects.begin(), surface.objects.end(),
                   [](const ContactObject& o) { return o.self || o.others; }))
     for (const GridPairs::Pair& p : grid_.find(boxes_))
-      if (mayTouch(surface, surface.segments[p.first], surface.segments[p.second], gap))
+      if (mayMeet(surface, surface.segments[p.first], surface.segments[p.second], gap))
         pairs_.push_back(p);
   on_solids_.clear();
   solids_ = motion.solids;
@@ -69,6 +67,29 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   if (!sheets.empty())
     sheets_.build(surface, sheets, solids, motion, {gap, margin, shift_, turn_});
   built_ = true;
+}
+
+bool Candidates::mayMeet(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b,
+                         double gap) const
+{
+  if (a.prescribed() && b.prescribed())
+    return false;
+  const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
+  if (a.object != b.object)
+    return c.others && d.others;
+  const double share = c.self ? contactShare(a, b, c, gap) : 0.0;
+  if (share == 0.0 || share == 1.0)
+    return share == 1.0;
+  // Balls around near segments of one curve: their boxes overlap although the curve is straight.
+  double reach = share * (a.coreRadius() + b.coreRadius() + gap);
+  const auto middle = [&](const ContactSegment& s) -> Eigen::Vector3d {
+    const Eigen::Vector3d from = 0.5 * (low_.col(s.a) + high_.col(s.a)), to = 0.5 * (low_.col(s.b) + high_.col(s.b));
+    const double around =
+        std::max((high_.col(s.a) - low_.col(s.a)).squaredNorm(), (high_.col(s.b) - low_.col(s.b)).squaredNorm());
+    reach += 0.5 * ((to - from).norm() + std::sqrt(around));
+    return 0.5 * (from + to);
+  };
+  return (middle(a) - middle(b)).norm() <= reach;
 }
 
 void Candidates::findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,

@@ -39,6 +39,7 @@ public:
   const SheetCandidates& sheets() const { return sheets_; }   ///< Of triangles, if there are any.
 
 private:
+  bool mayMeet(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap) const;
   void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
                    double gap, double margin);
 

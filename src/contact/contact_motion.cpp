@@ -34,12 +34,13 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   }
   double share = 1.0;
   ApproachLimit limit;
-  limit.reach = options.gap;
   const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
   for (const GridPairs::Pair& pair : candidates->pairs())
   {
     const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
-    limit.thickness = thicknessOf(pair);
+    const double scale = scaleOf(a, b);
+    limit.thickness = thicknessOf(pair, scale);
+    limit.reach = scale * options.gap;
     share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
   }
   int solid = -1;
@@ -68,11 +69,11 @@ double ContactPotential::Impl::thinned(const std::vector<Thinned>& list, const s
 }
 
 bool ContactPotential::Impl::fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance,
-                                 double thickness) const
+                                 double thickness, double scale) const
 {
   // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it
   // began with, and parts that something else than motion brought together come apart again.
-  const double least = options.gap / 20, opened = options.gap / 16;
+  const double least = scale * options.gap / 20, opened = scale * options.gap / 16;
   // Never to less than half of the distance between centrelines.
   if (distance - thickness < least)
     list.push_back({key, distance - std::min(opened, 0.5 * distance)});
@@ -89,7 +90,8 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
   {
     const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
     const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b));
-    if (!fit(thin_pairs_, {pair.first, pair.second, 0}, distance, a.coreRadius() + b.coreRadius()))
+    const double scale = scaleOf(a, b);
+    if (!fit(thin_pairs_, {pair.first, pair.second, 0}, distance, fullThickness(a, b, scale), scale))
       return false;
   }
   for (const Candidates::OnSolid& on : near_.onSolids())
@@ -130,12 +132,12 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
     {
       const ContactSegment &a = surface.segments[order_[p]], &b = surface.segments[order_[q]];
       const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
-      const bool counts = a.prescribed() && b.prescribed() ? false
-                          : a.object == b.object           ? c.self && !contactNeighbours(a, b, c, options.gap)
-                                                           : c.others && d.others;
+      const double scale = scaleOf(a, b);
+      const bool counts =
+          !(a.prescribed() && b.prescribed()) && scale > 0.0 && (a.object == b.object ? c.self : c.others && d.others);
       if (counts && boxes_[order_[p]].overlaps(boxes_[order_[q]]))
-        least = std::min(
-            least, segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - a.coreRadius() - b.coreRadius());
+        least = std::min(least,
+                         segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - fullThickness(a, b, scale));
     }
   for (std::size_t k = 0; k < solids.size(); ++k)
   {

@@ -187,7 +187,7 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
 {
   const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
   const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
-  const double thickness = thicknessOf(pair), range = thickness + options.gap;
+  const double scale = scaleOf(a, b), thickness = thicknessOf(pair, scale), range = thickness + scale * options.gap;
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
   const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
   // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
@@ -206,7 +206,7 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
                   Eigen::Vector3d::Zero(),
                   a.object,
                   b.object};
-  return addContact(x, gap, contact, 1.0, with_stiffness);
+  return addContact(x, gap, contact, scale, with_stiffness);
 }
 
 double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,

@@ -139,14 +139,24 @@ private:
     double thickness;
     bool operator<(const Thinned& other) const { return key < other.key; }
   };
-  /// Thins a pair at this distance if it has to be. False: the pieces meet.
-  bool fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness) const;
+  /// Thins a pair at this distance if it has to be; `scale`: of its gap. False: the pieces meet.
+  bool fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness,
+           double scale = 1.0) const;
   bool thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   static double thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness);
-  /// Distances of centrelines [m] at which pairs touch.
-  double thicknessOf(const GridPairs::Pair& pair) const
+  /// Share of thickness and gap that a pair of segments keeps, see contactShare().
+  double scaleOf(const ContactSegment& a, const ContactSegment& b) const
   {
-    const double full = surface.segments[pair.first].coreRadius() + surface.segments[pair.second].coreRadius();
+    return a.object == b.object ? contactShare(a, b, surface.objects[a.object], options.gap) : 1.0;
+  }
+  static double fullThickness(const ContactSegment& a, const ContactSegment& b, double scale)
+  {
+    return scale * (a.coreRadius() + b.coreRadius());
+  }
+  /// Distances of centrelines [m] at which pairs touch.
+  double thicknessOf(const GridPairs::Pair& pair, double scale) const
+  {
+    const double full = fullThickness(surface.segments[pair.first], surface.segments[pair.second], scale);
     return thin_pairs_.empty() ? full : thinned(thin_pairs_, {pair.first, pair.second, 0}, full);
   }
   double thicknessOf(const Candidates::OnSolid& on) const

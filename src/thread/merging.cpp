@@ -57,8 +57,12 @@ void MergingPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Contac
     if (isLast(own) && !(still && held[s.b]))
       meet(x, segments, fluids, own, true, other, gap, h);
   };
+  const auto merge = [&](const ContactSegment& s, const ContactSegment& o) {
+    const bool bend = s.object == o.object && contactShare(s, o, {}, gap) < 1.0;   // of one strand, which is open
+    return fluids[s.object].merges && fluids[o.object].merges && !bend;
+  };
   for (const GridPairs::Pair& pair : pairs)
-    if (fluids[segments[pair.first].object].merges && fluids[segments[pair.second].object].merges)
+    if (merge(segments[pair.first], segments[pair.second]))
     {
       meetBoth(pair.first, pair.second);
       meetBoth(pair.second, pair.first);

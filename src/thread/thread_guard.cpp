@@ -165,8 +165,8 @@ bool ThreadGuard::forOthers(const ThreadState& state, int first, int last, F&& f
     return true;
   const ContactProperties& own = strand_of_state->contact;
   const double core = strand_of_state->merging > 0.0 ? strand_of_state->merging : 1.0;
-  const auto meets = [&](const ThreadState& other, int j) {
-    return f(other.x[j], other.x[j + 1], other.radius(j), core);
+  const auto meets = [&](const ThreadState& other, int j, double share = 1.0) {
+    return share == 0.0 || f(other.x[j], other.x[j + 1], other.radius(j), share * core);
   };
   if (own.others && !forRods(f))
     return false;
@@ -177,14 +177,16 @@ bool ThreadGuard::forOthers(const ThreadState& state, int first, int last, F&& f
           return false;
   if (!own.self)
     return true;
-  const auto neighbours = [&](double apart, int j) { return apart < 0.5 * M_PI * (radius + state.radius(j)) + gap_; };
-  double apart = 0.0;
-  for (int j = first - 1; j >= 0; apart += state.edge(j--).norm())
-    if (!neighbours(apart, j) && !meets(state, j))
+  const auto meetsItself = [&](double along, int j) {
+    return meets(state, j, contactShare(along, radius + state.radius(j), gap_));
+  };
+  double along = 0.0;
+  for (int j = first - 1; j >= 0; along += state.edge(j--).norm())
+    if (!meetsItself(along, j))
       return false;
-  apart = 0.0;
-  for (int j = last + 1; j < state.edges(); apart += state.edge(j++).norm())
-    if (!neighbours(apart, j) && !meets(state, j))
+  along = 0.0;
+  for (int j = last + 1; j < state.edges(); along += state.edge(j++).norm())
+    if (!meetsItself(along, j))
       return false;
   return true;
 }

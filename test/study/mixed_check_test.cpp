@@ -84,5 +84,16 @@ TEST(MixedCheck, FindsRodsInRods)
               "rods: true", "rods: false");
 }
 
+/// The upper leg of a hairpin falls on the lower one. Both are nearer along the rod than half a turn of its tightest
+/// bend.
+TEST(MixedCheck, FindsBendsThatClose)
+{
+  expectFound(
+      "rods: [{centerline: {polyline: {points: [[0.05, 0, 0], [0, 0, 0], [0, 0, 0.006], [0.05, 0, 0.006]]}}, "
+      "cross_section: {radius: 0.005}, material: {density: 1000, youngs_modulus: 1.0e5, poissons_ratio: 0.4}, "
+      "damping: {stiffness: 0.02}, contact: {self: true}, grasps: {a: {edges: [0]}}}]\n",
+      "self: true", "self: false");
+}
+
 }   // namespace
 }   // namespace slender::study

@@ -46,19 +46,24 @@ TEST(BroadPhase, FindsThePairsOfBruteForceInOrder)
   }
 }
 
-TEST(BroadPhase, NeighboursAreMeasuredAlongTheCurve)
+TEST(BroadPhase, SharesAreMeasuredAlongTheCurve)
 {
   ContactObject open, ring;
   open.curve_length = ring.curve_length = 1.0;
   ring.closed = true;
-  const auto segment = [](double start) { return ContactSegment{0, 1, 0.01, 0, start, 0.02}; };
-  const double reach = M_PI * 0.01 + 0.002;
-  EXPECT_TRUE(contactNeighbours(segment(0.5), segment(0.52), open, 0.002));
-  EXPECT_TRUE(contactNeighbours(segment(0.52 + 0.99 * reach), segment(0.5), open, 0.002));
-  EXPECT_FALSE(contactNeighbours(segment(0.5), segment(0.52 + 1.01 * reach), open, 0.002));
-  EXPECT_FALSE(contactNeighbours(segment(0.0), segment(0.98), open, 0.002));
-  EXPECT_TRUE(contactNeighbours(segment(0.0), segment(0.98), ring, 0.002));
-  EXPECT_FALSE(contactNeighbours(segment(0.0), segment(0.98 - 1.01 * reach), ring, 0.002));
+  const double reach = 0.5 * M_PI * 0.022;
+  const auto share = [](double first, double second, const ContactObject& curve) {
+    const auto segment = [](double start) { return ContactSegment{0, 1, 0.01, 0, start, 0.02}; };
+    return contactShare(segment(first), segment(second), curve, 0.002);
+  };
+  EXPECT_EQ(share(0.5, 0.52, open), 0.0);
+  EXPECT_NEAR(share(0.52 + 0.25 * reach, 0.5, open), 0.25, 1e-12);
+  EXPECT_NEAR(share(0.5, 0.52 + 0.99 * reach, open), 0.99, 1e-12);
+  EXPECT_EQ(share(0.5, 0.52 + 1.01 * reach, open), 1.0);
+  EXPECT_EQ(share(0.0, 0.98, open), 1.0);
+  EXPECT_EQ(share(0.0, 0.98, ring), 0.0);
+  EXPECT_NEAR(share(0.0, 0.98 - 0.5 * reach, ring), 0.5, 1e-12);
+  EXPECT_EQ(share(0.0, 0.98 - 1.01 * reach, ring), 1.0);
 }
 
 /// A bundle that is shaken, sometimes violently, as far as stepLimit() lets it: whatever the history of calls, energy

@@ -53,9 +53,8 @@ struct IgnoredSolid
   std::vector<char> points;   ///< per point of the object: 1 if the pieces at this point pass; empty: all pieces pass
 };
 
-/// A curve or a cloth of a contact surface. Neighbouring pieces of one object are never a contact pair. Pieces of a
-/// curve are neighbours if their distance along the curve is less than about a quarter of a turn of its tightest bend.
-/// Pieces of a cloth are neighbours if they share a corner.
+/// A curve or a cloth of a contact surface. Pieces of one object that share a point are never a contact pair. Near
+/// pieces of one object keep a share of thickness and gap only: of a curve see contactShare(), of a cloth `rest`.
 struct ContactObject : ContactProperties
 {
   double curve_length = 0.0;   ///< [m]
@@ -112,10 +111,15 @@ struct BarrierRange
   double least = 0.0, most = std::numeric_limits<double>::infinity();
 };
 
-/// Whether two segments of one curve are neighbours, which never count as a pair: their rest distance along the curve,
-/// the shorter way around a closed one, is less than half a turn of the tightest bend that does not touch itself,
-/// (pi/2) (r1 + r2), plus the gap.
-bool contactNeighbours(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap);
+/// Share of thickness and gap that two segments of one curve keep from each other, by their distance along the curve
+/// and the sum of their radii. It is 1 from half a turn of the tightest bend on that does not touch itself, which is
+/// (pi/2) (r1 + r2 + gap). Below, it is proportional to the distance along the curve: thickness plus gap is 2/pi of
+/// that distance. A bend that is no tighter thus touches nothing, a bend that is stretched keeps the room that it has,
+/// and no pair begins to count all at once.
+double contactShare(double along, double radii, double gap);
+/// The same of two segments, by their distance along the curve at rest, the shorter way around a closed one. 0: they
+/// have a point in common, or nearly so, and never count as a pair.
+double contactShare(const ContactSegment& a, const ContactSegment& b, const ContactObject& curve, double gap);
 
 /// The tangential spring of a touching pair with friction, which begins to slip where it is stretched by
 /// ContactOptions::slip_speed times the length of a step [Cundall & Strack, A discrete numerical model for granular

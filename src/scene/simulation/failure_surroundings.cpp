@@ -197,8 +197,8 @@ private:
     return std::max(model.radius_a[edge], model.radius_b[edge]);
   }
 
-  /// Whether an edge of the same rod lies there because the rod comes back: it is no neighbour along the rod (see
-  /// contactNeighbours), and the way along the rod is at least twice as long as the distance.
+  /// Whether an edge of the same rod lies there because the rod comes back: it keeps its whole thickness there (see
+  /// contactShare()), and the way along the rod is at least twice as long as the distance.
   bool comesBack(const RodModel& model, int edge, double radii, double distance) const
   {
     const auto between = [&model](int from, int to) {
@@ -207,7 +207,7 @@ private:
     double along = edge >= place_.node ? between(place_.node, edge) : between(edge + 1, place_.node);
     if (model.closed)
       along = std::min(along, model.rest_length.sum() - along - model.rest_length[edge]);
-    return along > 0.5 * M_PI * radii + config_.contact.gap && along > 2.0 * distance;
+    return along > 0.5 * M_PI * (radii + config_.contact.gap) && along > 2.0 * distance;
   }
 
   void findPartnersOfThread()

@@ -244,15 +244,20 @@ void MixedCheck::checkTubes(MixedFindings& out) const
     for (std::size_t j = i + 1; j < tubes_.size(); ++j)
     {
       const Tube &s = tubes_[i], &t = tubes_[j];
-      if (s.object == t.object && contactNeighbours({0, 0, s.whole, 0, s.start, s.length},
-                                                    {0, 0, t.whole, 0, t.start, t.length}, curves_[s.object], gap_))
+      // What is near along one curve keeps the share of its thickness that contact promises, down to none where the
+      // pieces meet. From half a turn of the tightest bend on it keeps all.
+      const double share = s.object == t.object
+                               ? contactShare({0, 0, s.whole, 0, s.start, s.length},
+                                              {0, 0, t.whole, 0, t.start, t.length}, curves_[s.object], gap_)
+                               : 1.0;
+      if (share == 0.0)
         continue;
       const Eigen::Matrix3Xd &x = x_[s.object], &y = x_[t.object];
       const double reach = s.radius + t.radius + 0.51 * (s.length + t.length) + 1e-2;
       if ((0.5 * (x.col(s.a) + x.col(s.b)) - 0.5 * (y.col(t.a) + y.col(t.b))).norm() > 2.0 * reach)
         continue;
-      note(segmentDistance(x.col(s.a), x.col(s.b), y.col(t.a), y.col(t.b)) - s.radius - t.radius, names_[s.object],
-           names_[t.object], out);
+      note(segmentDistance(x.col(s.a), x.col(s.b), y.col(t.a), y.col(t.b)) - share * (s.radius + t.radius),
+           names_[s.object], names_[t.object], out);
     }
 }
 

@@ -141,11 +141,11 @@ double bruteForceClearance(const GroupSetup& g)
       const Piece& q = pieces[j];
       if (p.rod == q.rod)
       {
-        // neighbours along the curve, within half a turn of the tightest bend, never count (see contactNeighbours)
+        // pairs within half a turn of the tightest bend keep only a share of their thickness (see contactShare)
         double apart = std::max(q.from - p.to, p.from - q.to);
         if (p.closed)
           apart = std::min(apart, p.whole - std::max(p.to, q.to) + std::min(p.from, q.from));
-        if (!p.self || apart < 0.5 * M_PI * (p.radius + q.radius) + g.model.contact.gap)
+        if (!p.self || apart < 0.5 * M_PI * (p.radius + q.radius + g.model.contact.gap))
           continue;
       }
       least = std::min(least, segmentsApart(p.a, p.b, q.a, q.b) - p.radius - q.radius);
