@@ -28,7 +28,7 @@ AveragedClothSolver::AveragedClothSolver(const ClothModel& model, const ClothOpt
     average_sets_[s].swept = sweepsSuit(model.averages[s]);
   }
   if (std::any_of(average_sets_.begin(), average_sets_.end(), [](const AverageSet& set) { return set.swept; }))
-    sweeps_ = SymmetricSweeps(system.matrix(), system.constantMatrix());
+    sweeps_.setPattern(system.matrix(), system.constantMatrix());
   if (model.averages[0].bounds.size() > 0)
   {
     bounds_ = std::make_unique<AverageBounds>();
@@ -102,13 +102,8 @@ LinearOutcome AveragedClothSolver::solveMeeting(const Eigen::Matrix3Xd* averages
     setRight(d);
   }
   const double reference = takeFirstStep(d, averages, allowed);
-  const LinearResult result = cg_.solve(
-      right_, correction_, allowed, iterationsWithin(kMostLinearIterations),
-      [&](const PointVector& p, PointVector& ap) {
-        system_.applyMatrix(p, ap);
-        clearHeld(ap);
-      },
-      [&](PointVector& r, PointVector& z) { preconditionWithin(r, z); }, reference);
+  const LinearResult result = search(
+      allowed, [&](PointVector& r, PointVector& z) { preconditionWithin(r, z); }, reference);
   return correct(d, result, allowed, load_, linear_iterations);
 }
 

@@ -1,5 +1,5 @@
 // Clamped faces of a cloth that are held or released.
-#include "cloth_stages.h"
+#include "cloth_work.h"
 #include "slender_sim/energy/isometric_bending.h"
 
 namespace slender {
@@ -17,7 +17,7 @@ std::vector<char> heldClamps(const ClothModel& model, const ClothState& state)
 
 }   // namespace
 
-void ClothStages::followClamps(const ClothState& state)
+void ClothWork::followClamps(const ClothState& state)
 {
   if (model->clamped_faces.empty() || (clamps_known_ && state.pins == clamp_pins_))
     return;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "cloth_stages.h"
+#include "cloth_work.h"
 
 namespace slender {
 
@@ -21,7 +21,7 @@ double largest(int n, const PointVector& d)
 }   // namespace
 
 /// The matrix of imex steps, with the bending of the system.
-void ClothStages::useConstantMatrix()
+void ClothWork::useConstantMatrix()
 {
   if (options.integrator != Integrator::imex)
     return;
@@ -32,7 +32,7 @@ void ClothStages::useConstantMatrix()
 }
 
 /// h^2 w^2 + 2 b h w^2 < 4 with viscous forces from the strains one step ago, b the damping by stiffness.
-double ClothStages::stableStep() const
+double ClothWork::stableStep() const
 {
   constexpr int kIterations = 60;
   if (!isExplicit())
@@ -77,11 +77,11 @@ double ClothStages::stableStep() const
   return 4.0 / square / (b + std::sqrt(b * b + 4.0 / square));
 }
 
-StepFailure ClothStages::stepExplicitly(double from, double to, StepReport& report)
+StepFailure ClothWork::stepExplicitly(const Substep& substep, StepReport& report)
 {
   if (workExceeded())
     return StepFailure::work_exceeded;
-  const double h = to - from;
+  const double h = substep.length, end = substep.to / duration_;
   toPoints(work_.x, x);
   toPoints(work_.v, v_);
   next_ = work_;
@@ -95,8 +95,8 @@ StepFailure ClothStages::stepExplicitly(double from, double to, StepReport& repo
   const ClothEvaluation here = addForces(!constant_);
   pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
   if (!constant_)
-    moveByMasses(h, to / duration_);
-  else if (!moveByMatrix(h, to / duration_, report))
+    moveByMasses(h, end);
+  else if (!moveByMatrix(h, end, report))
     return StepFailure::singular_matrix;
   report.max_strain = std::max(report.max_strain, here.max_strain);
   const bool slow = next_.v.cwiseAbs().maxCoeff() < 1e8;
@@ -105,7 +105,7 @@ StepFailure ClothStages::stepExplicitly(double from, double to, StepReport& repo
 }
 
 /// Symplectic Euler: velocities by the forces at the start, then positions. Pins are at this fraction of the step.
-void ClothStages::moveByMasses(double h, double fraction)
+void ClothWork::moveByMasses(double h, double fraction)
 {
   const int n = model->vertices();
   for (int i = 0; i < n; ++i)
@@ -130,7 +130,7 @@ void ClothStages::moveByMasses(double h, double fraction)
 /// (M (1/h^2 + a/h) + (1 + b/h) K) d = M v/h + f - K x for the motion d of the step, with a and b of the damping, K of
 /// the bending, and f the membrane's forces (elastic and viscous) and the wind at the start, and the loads. Returns
 /// false if the matrix is singular.
-bool ClothStages::moveByMatrix(double h, double fraction, StepReport& report)
+bool ClothWork::moveByMatrix(double h, double fraction, StepReport& report)
 {
   const int n = model->vertices();
   if (h != constant_h_ || system->held() != constant_held_)

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <functional>
 
-#include "cloth_stages.h"
+#include "cloth_work.h"
 
 namespace slender {
 
-bool ClothStages::inputsFine(const ClothState& s, const ClothInputs& inputs, double duration, std::string& what) const
+bool ClothWork::inputsFine(const ClothState& s, const ClothInputs& inputs, double duration, std::string& what) const
 {
   const int n = model->vertices();
   const auto check = [&](bool good, const char* name) {
@@ -48,7 +48,7 @@ bool ClothStages::inputsFine(const ClothState& s, const ClothInputs& inputs, dou
   return what.empty();
 }
 
-bool ClothStages::accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const
+bool ClothWork::accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const
 {
   std::string what;
   if (inputsFine(state, inputs, duration, what))
@@ -57,13 +57,13 @@ bool ClothStages::accepts(const ClothState& state, const ClothInputs& inputs, do
   return false;
 }
 
-StepReport ClothStages::refuse(StepReport& report, StepFailure failure, const std::string& message) const
+StepReport ClothWork::refuse(StepReport& report, StepFailure failure, const std::string& message) const
 {
   report.work = ownWork();
   return report.refuse(failure, "cloth '" + model->name + "': " + message);
 }
 
-std::string ClothStages::explain(StepFailure failure, double length) const
+std::string ClothWork::explain(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + milliseconds(length);
   if (isExplicit())
@@ -93,7 +93,7 @@ std::string ClothStages::explain(StepFailure failure, double length) const
          "shape whose faces have area";
 }
 
-StepReport ClothStages::refuseUnsolved(StepReport& report, StepFailure failure, double length, const char* why)
+StepReport ClothWork::refuseUnsolved(StepReport& report, StepFailure failure, double length, const char* why)
 {
   // explicit steps end in a state that says nothing, and a spent budget may have left none; then the state at the start
   // of the step is looked at

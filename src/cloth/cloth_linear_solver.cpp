@@ -24,7 +24,7 @@ ClothLinearSolver::ClothLinearSolver(const ClothModel& model, const ClothOptions
   if (kind_ == ClothSolver::cholesky)
     factor_.setPattern(system.matrix());
   else if (kind_ == ClothSolver::gauss_seidel)
-    sweeps_ = SymmetricSweeps(system.matrix(), system.constantMatrix());
+    sweeps_.setPattern(system.matrix(), system.constantMatrix());
   else
   {
     preconditioner_ = std::make_unique<ClothPreconditioner>(model, system.terms(), system.matrix());
@@ -106,13 +106,7 @@ LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, in
     preconditioner_->align(*at, system_.matrix(), held);
   else
     preconditioner_->useConstant();
-  const LinearResult result = cg_.solve(
-      right_, correction_, allowed, iterationsWithin(kMostLinearIterations),
-      [&](const PointVector& p, PointVector& ap) {
-        system_.applyMatrix(p, ap);
-        clearHeld(ap);
-      },
-      [&](PointVector& r, PointVector& z) { preconditioner_->apply(r, z); });
+  const LinearResult result = search(allowed, [&](PointVector& r, PointVector& z) { preconditioner_->apply(r, z); });
   return correct(d, result, allowed, 0.0, linear_iterations);
 }
 

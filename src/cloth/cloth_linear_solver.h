@@ -8,7 +8,7 @@
 #include "cloth_system.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
-#include "slender_sim/linalg/symmetric_sweeps.h"
+#include "linalg/symmetric_sweeps.h"
 
 namespace slender {
 
@@ -58,6 +58,17 @@ protected:
   void clearHeld(PointVector& v) const;
   /// right_: what d leaves of the equations, held points zero.
   void setRight(const PointVector& d);
+  /// Solves for correction_ by conjugate gradients with right_. `reference`: as ConjugateGradients::solve().
+  template <class Precondition>
+  LinearResult search(double tolerance, const Precondition& precondition, double reference = 0.0)
+  {
+    const auto apply = [this](const PointVector& p, PointVector& ap) {
+      system_.applyMatrix(p, ap);
+      clearHeld(ap);
+    };
+    return cg_.solve(right_, correction_, tolerance, iterationsWithin(kMostLinearIterations), apply, precondition,
+                     reference);
+  }
   /// Adds correction_, the solution of conjugate gradients, to d. `load`: what is strained so much that little is left
   /// beside this load is solved to a share of it.
   LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, double load,

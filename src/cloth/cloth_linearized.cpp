@@ -1,9 +1,9 @@
 // Solves Newton's equations of a stage, and checks the energy of linearised steps.
-#include "cloth_stages.h"
+#include "cloth_work.h"
 
 namespace slender {
 
-LinearOutcome ClothStages::solveNewton(PointVector& d, bool linearized, StepReport& counts)
+LinearOutcome ClothWork::solveNewton(PointVector& d, bool linearized, StepReport& counts)
 {
   if (!averages || !linearized)
     return linear->solve(d, linearized ? nullptr : &x, counts.linear_iterations, counts.factorizations);
@@ -13,7 +13,7 @@ LinearOutcome ClothStages::solveNewton(PointVector& d, bool linearized, StepRepo
 
 /// Implicit Euler is linearised at the start of the stage, where the cloth is balanced. Methods of second order are
 /// linearised at the motion carried on, which is near enough to the end that the semidefinite matrix costs no order.
-void ClothStages::placeLinearized(PointVector& motion)
+void ClothWork::placeLinearized(PointVector& motion)
 {
   const bool ahead = order(options.integrator) == 2;
   for (int i = 0; i < model->vertices(); ++i)
@@ -26,7 +26,7 @@ void ClothStages::placeLinearized(PointVector& motion)
 }
 
 /// The strains at this point are those from which viscous forces are counted.
-void ClothStages::takeStartEnergy(double energy)
+void ClothWork::takeStartEnergy(double energy)
 {
   if (order(options.integrator) == 2)
     return;   // known since the substep began
@@ -34,7 +34,7 @@ void ClothStages::takeStartEnergy(double energy)
   elastic_start_ = (1.0 + system->viscosity()) * energy;
 }
 
-double ClothStages::closeGradient()
+double ClothWork::closeGradient()
 {
   const double internal = largestInternal();
   pin_work_ = average_work_ = 0.0;
@@ -49,7 +49,7 @@ double ClothStages::closeGradient()
 }
 
 /// Work [J] of forces on the free vertices, from the start of a step to x.
-double ClothStages::workOnFree(const PointVector& forces) const
+double ClothWork::workOnFree(const PointVector& forces) const
 {
   double work = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
@@ -61,7 +61,7 @@ double ClothStages::workOnFree(const PointVector& forces) const
 /// A step of implicit Euler that is solved loses some energy, but for what buckling releases. A linearised one that
 /// turns or swings stretched cloth too far for its tangent leaves forces unbalanced, whose work is the energy that
 /// appears.
-bool ClothStages::createsEnergy(double energy) const
+bool ClothWork::createsEnergy(double energy) const
 {
   // of what there was: sound steps lose energy, those that blow up create many times that
   constexpr double kCreated = 0.1;

@@ -22,10 +22,10 @@ constexpr double kMostTurn = 0.7;         ///< of an edge in an iteration [rad],
 }   // namespace
 
 ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options)
-  : own_(std::make_unique<ClothStages>(std::move(model), options, false)),
-    stages_(*own_)
+  : own_(std::make_unique<ClothWork>(std::move(model), options, false)),
+    work_(*own_)
 {
-  const ClothModel& m = *stages_.model;
+  const ClothModel& m = *work_.model;
   if (options.integrator != Integrator::implicit_euler)
     throw std::invalid_argument("cloth '" + m.name +
                                 "': contact and joints with other objects need time.integrator: implicit_euler");
@@ -45,17 +45,15 @@ ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions
   allocate();
 }
 
-ClothPart::ClothPart(ClothStages& stages)
-  : stages_(stages),
-    linearized_(stages.options.one_newton_step && !stages.isExplicit())
+ClothPart::ClothPart(ClothWork& work) : work_(work), linearized_(work.options.one_newton_step && !work.isExplicit())
 {
-  if (!stages.isExplicit())
+  if (!work.isExplicit())
     allocate();
 }
 
 void ClothPart::allocate()
 {
-  const ClothModel& m = *stages_.model;
+  const ClothModel& m = *work_.model;
   inverse_length_.resize(static_cast<std::size_t>(m.topology.edges.cols()));
   for (std::size_t e = 0; e < inverse_length_.size(); ++e)
   {
@@ -63,7 +61,7 @@ void ClothPart::allocate()
     inverse_length_[e] = 1.0 / (m.rest.vertices.col(edge[1]) - m.rest.vertices.col(edge[0])).norm();
   }
   for (PointVector* v : {&base_, &base_before_, &saved_, &direction_, &solution_})
-    v->assign(stages_.x.size(), 0.0);
+    v->assign(work_.x.size(), 0.0);
 }
 
 // ---- a step
@@ -71,20 +69,20 @@ void ClothPart::allocate()
 void ClothPart::begin(const ClothState& state, const ClothInputs& inputs, double duration)
 {
   counts_ = {};
-  stages_.begin(state, inputs, duration);
+  work_.begin(state, inputs, duration);
   setPins(state.pins);
   duration_ = duration;
   averages_ = average_sets_.empty() ? nullptr : average_sets_[static_cast<std::size_t>(state.average_set)].get();
   if (!averages_)
     return;
   averages_->begin(state.x, inputs.averages);
-  stages_.startBudget(kTimesWork);
+  work_.startBudget(kTimesWork);
 }
 
 StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
-  stages_.beginStep(plan, substep.from, substep.to);
-  dependent_ = averages_ && !averages_->prepare(stages_.model->mass, [this](int i) { return !system().held()[i]; });
+  work_.beginSubstep(plan, substep);
+  dependent_ = averages_ && !averages_->prepare(work_.model->mass, [this](int i) { return !system().held()[i]; });
   if (averages_)
     averages_->place(substep.to / duration_);
   return dependent_ ? StepFailure::singular_matrix : StepFailure::none;
@@ -92,11 +90,11 @@ StepFailure ClothPart::beginSubstep(const StepPlan& plan, const Substep& substep
 
 void ClothPart::beginStage(std::size_t stage)
 {
-  stages_.beginStage(stage);
+  work_.beginStage(stage);
   if (linearized_)
-    stages_.placeLinearized(direction_);
+    work_.placeLinearized(direction_);
   else
-    stages_.placeGuess();
+    work_.placeGuess();
   if (averages_)
     averages_->forces.setZero();
   meetAverages();
@@ -109,27 +107,27 @@ void ClothPart::endStage(std::size_t stage, bool last, StepReport& report)
 {
   if (!last)
   {
-    stages_.endStage(stage);
+    work_.endStage(stage);
     return;
   }
-  stages_.takeEnd(std::max(largest_internal_, largest_contact_), evaluation.max_strain, report);
+  work_.finish(std::max(largest_internal_, largest_contact_), evaluation.max_strain, report);
   if (averages_)
-    stages_.average_forces = averages_->forces;
+    work_.average_forces = averages_->forces;
   report.linear_iterations += counts_.linear_iterations;
   counts_ = {};
 }
 
 StepFailure ClothPart::finishSubstep(StepReport&)
 {
-  return linearized_ && stages_.createsEnergy(evaluation.stretch + evaluation.bend_twist) ? StepFailure::energy_grew
-                                                                                          : StepFailure::none;
+  return linearized_ && work_.createsEnergy(evaluation.stretch + evaluation.bend_twist) ? StepFailure::energy_grew
+                                                                                        : StepFailure::none;
 }
 
 /// The semidefinite Hessian is positive definite with inertia. What its solver cannot solve, a cloth alone solves in a
 /// shorter step, which has more inertia. In islands of several parts shifts come first.
 StepFailure ClothPart::givesUp() const
 {
-  if (stages_.workExceeded())
+  if (work_.workExceeded())
     return StepFailure::work_exceeded;
   if (own_ || exact_ || coupled || outcome_ == LinearOutcome::solved)
     return StepFailure::none;
@@ -146,7 +144,7 @@ void ClothPart::refuse(StepFailure failure, double length, StepReport& report) c
     why =
         "what the cloth touches may not let it have the averages of its guide: keep the guide clear of that, or let "
         "it move by less at once";
-  stages_.refuseUnsolved(report, stages_.workExceeded() ? StepFailure::work_exceeded : failure, length, why);
+  work_.refuseUnsolved(report, work_.workExceeded() ? StepFailure::work_exceeded : failure, length, why);
 }
 
 Largest ClothPart::unbalancedForce() const
@@ -177,7 +175,7 @@ bool ClothPart::numberUnknowns()
 
 void ClothPart::moveAlong(double alpha)
 {
-  PointVector& x = stages_.x;
+  PointVector& x = work_.x;
   if (alpha == 0.0)   // whatever the direction is, which may be that of an attempt that overflowed
   {
     std::copy(base_.begin(), base_.end(), x.begin());
@@ -187,13 +185,13 @@ void ClothPart::moveAlong(double alpha)
   for (std::size_t i = 0; i < x.size(); ++i)
     x[i] = base_[i] + alpha * direction_[i];
   moved_ = true;
-  stages_.meetAverages();
+  work_.meetAverages();
 }
 
 void ClothPart::accept()
 {
   base_before_.swap(base_);
-  base_ = stages_.x;
+  base_ = work_.x;
   moved_ = false;
 }
 
@@ -201,14 +199,14 @@ void ClothPart::retreat(double share)
 {
   for (int i = 0; i < points(); ++i)
     if (isFree(i))
-      vertex(stages_.x, i) = vertex(base_, i) + share * (vertex(stages_.x, i) - vertex(base_, i));
+      vertex(work_.x, i) = vertex(base_, i) + share * (vertex(work_.x, i) - vertex(base_, i));
 }
 
 void ClothPart::placeHeld(double fraction)
 {
-  const std::vector<int>& pins = stages_.present().pins;
+  const std::vector<int>& pins = work_.present().pins;
   for (std::size_t k = 0; k < pins.size(); ++k)
-    vertex(stages_.x, pins[k]) = stages_.pinAt(k, fraction);
+    vertex(work_.x, pins[k]) = work_.pinAt(k, fraction);
   if (averages_)
     averages_->place(fraction);
 }
@@ -216,35 +214,34 @@ void ClothPart::placeHeld(double fraction)
 void ClothPart::meetAverages()
 {
   if (averages_)
-    averages_->meet([this](int i) { return vertex(stages_.x, i); },
-                    [this](int i, int component, double length) { vertex(stages_.x, i)[component] += length; });
+    averages_->meet([this](int i) { return vertex(work_.x, i); },
+                    [this](int i, int component, double length) { vertex(work_.x, i)[component] += length; });
 }
 
 bool ClothPart::heldMoves(double from, double to) const
 {
   if (from != to && averages_ && averages_->move())
     return true;
-  const std::vector<int>& pins = stages_.present().pins;
+  const std::vector<int>& pins = work_.present().pins;
   for (std::size_t k = 0; k < pins.size(); ++k)
-    if (from == to ? vertex(stages_.x, pins[k]) != vertex(base_, pins[k])
-                   : stages_.pinAt(k, from) != stages_.pinAt(k, to))
+    if (from == to ? vertex(work_.x, pins[k]) != vertex(base_, pins[k]) : work_.pinAt(k, from) != work_.pinAt(k, to))
       return true;
   return false;
 }
 
 void ClothPart::retreatHeld(double share)
 {
-  for (const int p : stages_.present().pins)
-    vertex(stages_.x, p) = vertex(base_, p) + share * (vertex(stages_.x, p) - vertex(base_, p));
+  for (const int p : work_.present().pins)
+    vertex(work_.x, p) = vertex(base_, p) + share * (vertex(work_.x, p) - vertex(base_, p));
 }
 
 void ClothPart::gather(Eigen::Matrix3Xd& x) const
 {
   for (int i = 0; i < points(); ++i)
-    x.col(first_point + i) = vertex(stages_.x, i);
+    x.col(first_point + i) = vertex(work_.x, i);
 }
 
-void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_point, points()) = stages_.present().x; }
+void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_point, points()) = work_.present().x; }
 
 // ---- equations
 
@@ -254,8 +251,7 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   exact_ = statics || (near_ && shift.position == 0.0 && !linearized_);
   const HessianKind kind = exact_ ? HessianKind::exact : HessianKind::semidefinite;
   const PointVector* const from = linearized_ || statics ? nullptr : moved_ ? &base_ : &base_before_;
-  const ClothEvaluation e =
-      with_hessian ? system().evaluateHessian(stages_.x, kind, from) : system().evaluate(stages_.x);
+  const ClothEvaluation e = with_hessian ? system().evaluateHessian(work_.x, kind, from) : system().evaluate(work_.x);
   largest_contact_ = 0.0;
   evaluation = {};
   evaluation.stretch = e.membrane;
@@ -263,7 +259,7 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
   evaluation.potential = e.potential;
   evaluation.max_strain = e.max_strain;
   if (!with_hessian)
-    largest_internal_ = stages_.closeGradient();
+    largest_internal_ = work_.closeGradient();
   if (averages_)
     averages_->forEntries([&](Eigen::Index i, int point, double weight) {
       vertex(system().gradient(), point) -= weight * averages_->forces.col(i);
@@ -326,17 +322,17 @@ void ClothPart::factor(const HessianShift& shift)
   else if (added > 0.0)
     system().shiftMatrix(added);
   if (solvesByFactors())
-    outcome_ = stages_.linear->factor() ? LinearOutcome::solved : LinearOutcome::not_definite;
+    outcome_ = work_.linear->factor() ? LinearOutcome::solved : LinearOutcome::not_definite;
   else
   {
     if (linearized_)
     {
-      stages_.takeStartEnergy(evaluation.stretch + evaluation.bend_twist);
+      work_.takeStartEnergy(evaluation.stretch + evaluation.bend_twist);
       std::copy(direction_.begin(), direction_.end(), solution_.begin());
     }
     else
       std::fill(solution_.begin(), solution_.end(), 0.0);
-    outcome_ = stages_.solveNewton(solution_, linearized_, counts_);
+    outcome_ = work_.solveNewton(solution_, linearized_, counts_);
   }
   const bool definite = outcome_ == LinearOutcome::solved;
   if (exact_ && added == 0.0)
@@ -350,7 +346,7 @@ void ClothPart::solve()
   {
     for (int i = 0; i < points(); ++i)
       vertex(direction_, i) = isFree(i) ? Eigen::Vector3d(-vertex(system().gradient(), i)) : Eigen::Vector3d::Zero();
-    stages_.linear->solveFactored(direction_);
+    work_.linear->solveFactored(direction_);
   }
   else
     std::swap(direction_, solution_);
@@ -373,7 +369,7 @@ void ClothPart::takeDirection(const double* solution)
       vertex(direction_, i).setZero();
   near_ = incrementSize(0.0) < kNear;
   if (averages_)
-    stages_.spend(points() * (kSharedFactorWork + 3 * averages_->count() * kSharedSolutionWork));
+    work_.spend(points() * (kSharedFactorWork + 3 * averages_->count() * kSharedSolutionWork));
 }
 
 // ---- measures
@@ -382,7 +378,7 @@ double ClothPart::stepLimit() const
 {
   if (!contact_ && !(statics_rate_ > 0.0))   // with inertia the energy alone bears turns of any size
     return 1.0;
-  const auto& edges = stages_.model->topology.edges;
+  const auto& edges = work_.model->topology.edges;
   double turn = 0.0;
   for (std::size_t e = 0; e < inverse_length_.size(); ++e)
   {
@@ -397,7 +393,7 @@ double ClothPart::incrementSize(double) const
   double square = 0.0;
   for (int i = 0; i < points(); ++i)
     square = std::max(square, vertex(direction_, i).squaredNorm());
-  return std::sqrt(square) / stages_.shortestEdge();
+  return std::sqrt(square) / work_.shortestEdge();
 }
 
 double ClothPart::slope() const
@@ -421,12 +417,12 @@ double ClothPart::residual() const
 /// what Newton's tolerance leaves.
 double ClothPart::forceScale() const
 {
-  const ClothModel& m = *stages_.model;
+  const ClothModel& m = *work_.model;
   // alone: with IslandTolerances::most_unbalanced a tenth of this may be unbalanced
-  const double resolved = own_ ? stages_.resolvedForce() : 10.0 * stages_.resolvedForce();
-  double largest = std::max(resolved, stages_.largestInternal());
-  largest = std::max(largest, m.mass.maxCoeff() * stages_.inputs().gravity.norm());
-  for (const int p : stages_.present().pins)
+  const double resolved = own_ ? work_.resolvedForce() : 10.0 * work_.resolvedForce();
+  double largest = std::max(resolved, work_.largestInternal());
+  largest = std::max(largest, m.mass.maxCoeff() * work_.inputs().gravity.norm());
+  for (const int p : work_.present().pins)
     largest = std::max(largest, vertex(system().gradient(), p).norm());
   if (averages_)   // each spreads its force over vertices
     largest = std::max(largest, averages_->forces.cwiseAbs().maxCoeff() * averages_->count() / points());
@@ -437,9 +433,9 @@ double ClothPart::forceScale() const
 /// inertia in short steps.
 double ClothPart::noiseLevel() const
 {
-  const ClothModel& m = *stages_.model;
+  const ClothModel& m = *work_.model;
   double extent = 0.0;
-  for (const double x : stages_.x)
+  for (const double x : work_.x)
     extent = std::max(extent, std::abs(x));
   const std::vector<double>& weights = system().weights();
   const double stiffness = m.membrane.c11 + m.membrane.c22 + *std::max_element(weights.begin(), weights.end());

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "island/part.h"
-#include "cloth_stages.h"
+#include "cloth_work.h"
 #include "slender_sim/contact/contact_properties.h"
 
 namespace slender {
@@ -28,16 +28,16 @@ public:
   /// step or not. A cloth with prescribed averages is always coupled, because its own solvers know no averages.
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
   /// A cloth that is alone in its island. It takes all integrators of cloth, bounds of the forces of averages, and
-  /// `one_newton_step` of the options. The stages must outlive the part. The owner of the stages starts the budget
+  /// `one_newton_step` of the options. The working copy must outlive the part. Its owner starts the budget
   /// of work of each step.
-  explicit ClothPart(ClothStages& stages);
+  explicit ClothPart(ClothWork& work);
 
   /// State, inputs, forces on pins, and messages.
-  ClothStages& stages() const { return stages_; }
+  ClothWork& work() const { return work_; }
   /// Whether a step from this state with these inputs can begin. If not, the report says why.
   bool accepts(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report) const
   {
-    return stages_.accepts(state, inputs, duration, report);
+    return work_.accepts(state, inputs, duration, report);
   }
 
   /// Sets what the cloth touches, and which solids its points pass through. `step` is the length of a step [s]. Without
@@ -47,31 +47,31 @@ public:
   void setPins(const std::vector<int>& pins);
   /// For statics. The Hessian is always the exact one, and a shift adds so much inertia [1/s^2] per unit.
   void minimiseWithoutInertia(double rate) { statics_rate_ = rate; }
-  int points() const override { return stages_.model->vertices(); }
+  int points() const override { return work_.model->vertices(); }
   void addSurface(ContactSurface& surface) const override;
 
   // ---- a step
   /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
   void begin(const ClothState& state, const ClothInputs& inputs, double duration);
-  void end(ClothState& state) { stages_.end(state); }
+  void end(ClothState& state) { work_.end(state); }
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport& report) override;
   StepFailure finishSubstep(StepReport&) override;
   StepFailure predict(const Substep& substep, StepReport& report) override
   {
-    return stages_.stepExplicitly(substep.from, substep.to, report);
+    return work_.stepExplicitly(substep, report);
   }
-  void acceptSubstep(const Substep&) override { stages_.commitStep(); }
+  void acceptSubstep(const Substep&) override { work_.accept(); }
   Largest unbalancedForce() const override;
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
-  bool shorterMayHelp(StepFailure) const override { return !stages_.workExceeded(); }
+  bool shorterMayHelp(StepFailure) const override { return !work_.workExceeded(); }
   StepFailure givesUp() const override;
 
 private:
   // ---- its steps
-  double shortestEdge() const override { return stages_.shortestEdge(); }
+  double shortestEdge() const override { return work_.shortestEdge(); }
   long surfaceVersion() const override { return surface_version_; }
   BarrierRange barrierRange(double gap) const override;
   BoundingBox surfaceBox(double ahead) const override;
@@ -115,20 +115,20 @@ private:
 
   static Eigen::Map<Eigen::Vector3d> vertex(PointVector& v, int i) { return point(v, i); }
   static Eigen::Map<const Eigen::Vector3d> vertex(const PointVector& v, int i) { return point(v, i); }
-  ClothSystem& system() const { return *stages_.system; }
+  ClothSystem& system() const { return *work_.system; }
   bool isFree(int i) const { return number_[i] >= 0; }
   double inertiaShift(const HessianShift& shift) const;
   void addToBlocks(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
   void addOwnContacts(bool with_hessian);
   void factor(const HessianShift& shift);
   void allocate();
-  bool solvesByFactors() const { return stages_.linear->kind() == ClothSolver::cholesky && !linearized_; }
+  bool solvesByFactors() const { return work_.linear->kind() == ClothSolver::cholesky && !linearized_; }
 
-  std::unique_ptr<ClothStages> own_;                                ///< null: the stages belong to another object
-  ClothStages& stages_;                                             ///< whose x is the trial
-  std::vector<std::unique_ptr<AverageConstraints>> average_sets_;   ///< of a cloth with stages of its own
+  std::unique_ptr<ClothWork> own_;   ///< null: the working copy belongs to another object
+  ClothWork& work_;                  ///< whose x is the trial
+  std::vector<std::unique_ptr<AverageConstraints>> average_sets_;   ///< of a cloth with a working copy of its own
   AverageConstraints* averages_ =
-      nullptr;                ///< the set of the present step; null: the stages have it, or there is none
+      nullptr;                ///< the set of the present step; null: the working copy has it, or there is none
   bool dependent_ = false;    ///< the averages depend on each other on the free vertices
   bool linearized_ = false;   ///< steps are one step of Newton's method
   double statics_rate_ = 0;   ///< see minimiseWithoutInertia(); 0: steps

@@ -10,7 +10,7 @@ void ClothPart::setContact(const ContactProperties& contact, double step, const 
   ignored_ = ignored.empty() ? nullptr : std::make_shared<std::vector<IgnoredSolid>>(ignored);
   contact_ = contact;
   contact_step_ = step;
-  rest_ = std::make_shared<Eigen::Matrix3Xd>(stages_.model->rest.vertices);
+  rest_ = std::make_shared<Eigen::Matrix3Xd>(work_.model->rest.vertices);
   ++surface_version_;
 }
 
@@ -28,7 +28,7 @@ void ClothPart::addSurface(ContactSurface& surface) const
   surface.points += points();
   if (!contact_)
     return;
-  const Eigen::Matrix3Xi& triangles = stages_.model->rest.triangles;
+  const Eigen::Matrix3Xi& triangles = work_.model->rest.triangles;
   ContactTriangle t;
   t.object = static_cast<int>(surface.objects.size());
   t.half_thickness = 0.5 * contact_->thickness;
@@ -54,7 +54,7 @@ BarrierRange ClothPart::barrierRange(double gap) const
 {
   BarrierRange range;
   if (contact_)
-    range.least = stages_.model->mass.maxCoeff() * std::max(10.0, gap / (contact_step_ * contact_step_));
+    range.least = work_.model->mass.maxCoeff() * std::max(10.0, gap / (contact_step_ * contact_step_));
   return range;
 }
 
@@ -63,11 +63,11 @@ BoundingBox ClothPart::surfaceBox(double ahead) const
   BoundingBox box = BoundingBox::empty();
   if (!contact_)
     return box;
-  const ClothState& state = stages_.present();
+  const ClothState& state = work_.present();
   for (Eigen::Index i = 0; i < state.x.cols(); ++i)
     box.include(state.x.col(i) + ahead * state.v.col(i));
   for (std::size_t k = 0; ahead > 0.0 && k < state.pins.size(); ++k)
-    box.include(stages_.pinAt(k, std::min(1.0, ahead / contact_step_)));
+    box.include(work_.pinAt(k, std::min(1.0, ahead / contact_step_)));
   box.enlarge(0.5 * contact_->thickness);
   return box;
 }

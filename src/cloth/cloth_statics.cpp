@@ -33,12 +33,12 @@ ClothOptions directOptions()
 }   // namespace
 
 ClothStatics::ClothStatics(const ClothModel& model, const NewtonConfig& newton)
-  : stages_(elasticPart(model), directOptions()),
-    part_(stages_),
+  : work_(elasticPart(model), directOptions()),
+    part_(work_),
     equations_(false),
-    model_(*stages_.model),
-    system_(*stages_.system),
-    linear_(*stages_.linear),
+    model_(*work_.model),
+    system_(*work_.system),
+    linear_(*work_.linear),
     newton_(newton)
 {
   equations_.setParts({&part_});
@@ -54,7 +54,7 @@ void ClothStatics::begin(const ClothState& state, const ClothInputs& inputs)
   state_ = state;
   inputs_ = inputs;
   inputs_.wind.setZero();
-  stages_.begin(state_, inputs_, 1.0);
+  work_.begin(state_, inputs_, 1.0);
   toPoints(state.x, x_);
   system_.hold(state_);
   double load = 0.0;
@@ -111,7 +111,7 @@ double ClothStatics::residual() const
 double ClothStatics::forceScale() const
 {
   const PointVector& gradient = system_.gradient();
-  double largest = 1e-9 * (model_.membrane.c11 + model_.membrane.c22) * stages_.shortestEdge();
+  double largest = 1e-9 * (model_.membrane.c11 + model_.membrane.c22) * work_.shortestEdge();
   for (int i = 0; i < model_.vertices(); ++i)
     largest = std::max({largest, point(force_, i).norm(), system_.held()[i] ? point(gradient, i).norm() : 0.0});
   return largest;
@@ -120,7 +120,7 @@ double ClothStatics::forceScale() const
 NewtonResult ClothStatics::round(double fraction, double weight)
 {
   setRound(weight * unit_rate_);
-  PointVector& trial = stages_.x;
+  PointVector& trial = work_.x;
   trial = x_;
   for (std::size_t k = 0; k < state_.pins.size(); ++k)
   {
@@ -139,14 +139,14 @@ double ClothStatics::shift() const
 {
   double square = 0.0;
   for (int i = 0; i < model_.vertices(); ++i)
-    square = std::max(square, (point(x_, i) - point(stages_.x, i)).squaredNorm());
+    square = std::max(square, (point(x_, i) - point(work_.x, i)).squaredNorm());
   return std::sqrt(square) / size_;
 }
 
 void ClothStatics::takeBase()
 {
   static_cast<Part&>(part_).moveAlong(0.0);
-  x_ = stages_.x;
+  x_ = work_.x;
 }
 
 /// Returns the number of moves in which the pins can be carried to their targets: each at most a fifth of an edge. 0:
@@ -154,7 +154,7 @@ void ClothStatics::takeBase()
 double ClothStatics::pinMoves() const
 {
   return state_.pins.empty() ? 0.0
-                             : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * stages_.shortestEdge());
+                             : (inputs_.pins - pins_from_).colwise().norm().maxCoeff() / (0.2 * work_.shortestEdge());
 }
 
 bool ClothStatics::definite(double rate)

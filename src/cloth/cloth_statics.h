@@ -43,7 +43,7 @@ private:
   double forceScale() const;
   void finish(StepReport& report);
 
-  ClothStages stages_;   ///< whose x is the trial of a round
+  ClothWork work_;   ///< whose x is the trial of a round
   ClothPart part_;
   Equations equations_;
   const ClothModel& model_;

@@ -5,7 +5,7 @@
 namespace slender {
 
 ClothStepper::Impl::Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o)
-  : ClothStages(std::move(m), o),
+  : ClothWork(std::move(m), o),
     part_(*this)
 {
 }

@@ -1,14 +1,14 @@
 #pragma once
 
 #include "cloth_part.h"
-#include "cloth_stages.h"
+#include "cloth_work.h"
 #include "cloth_statics.h"
 #include "island/island.h"
 
 namespace slender {
 
 /// A cloth on its own, an island of one part; and statics.
-class ClothStepper::Impl : public ClothStages
+class ClothStepper::Impl : public ClothWork
 {
 public:
   Impl(std::shared_ptr<const ClothModel> m, const ClothOptions& o);

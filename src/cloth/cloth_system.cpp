@@ -25,8 +25,6 @@ constexpr int kEnergyWork = 2, kHessianWork = 8;
 
 }   // namespace
 
-double ClothEvaluation::magnitude() const { return std::abs(membrane) + std::abs(bending) + std::abs(potential); }
-
 void ClothEvaluation::count(TermAccount account, const TermSums& sums)
 {
   (account == TermAccount::stretching ? membrane : bending) += sums.energy;
@@ -168,17 +166,6 @@ void ClothSystem::beginStage(const ClothStage& stage, const ClothInputs& inputs)
     load->begin(*stage.wind_at, *stage.q_tilde, *stage.velocity, inputs.wind, stage.tau, force_);
 }
 
-double ClothSystem::loadPotential(const PointVector& x) const
-{
-  double potential = 0.0;
-  for (int i = 0; i < points(); ++i)
-    potential += 0.5 * weight_[i] * (point(x, i) - point(target_, i)).squaredNorm() -
-                 point(force_, i).dot(point(x, i) - point(start_, i));
-  for (const auto& load : loads_)
-    potential += load->value(x.data());
-  return potential;
-}
-
 double ClothSystem::addLoads(const PointVector& x)
 {
   double potential = 0.0;
@@ -201,16 +188,6 @@ ClothEvaluation ClothSystem::addInternal(const PointVector& x, PointVector& grad
   for (const ClothTerm& term : terms_)
     if (with_constant || !term.energy->constantMatrix())
       result.count(term.energy->account(), term.energy->addGradient(x.data(), gradient.data()));
-  return result;
-}
-
-ClothEvaluation ClothSystem::energy(const PointVector& x)
-{
-  spend(kEnergyWork);
-  ClothEvaluation result;
-  result.potential = loadPotential(x);
-  for (const ClothTerm& term : terms_)
-    result.count(term.energy->account(), term.energy->value(x.data()));
   return result;
 }
 

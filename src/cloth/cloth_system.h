@@ -15,7 +15,6 @@ struct ClothEvaluation
   double membrane = 0, bending = 0, potential = 0;
   double max_strain = 0;   ///< largest |principal stretch - 1|
   double energy() const { return membrane + bending + potential; }
-  double magnitude() const;
   void count(TermAccount account, const TermSums& sums);
 };
 
@@ -62,7 +61,6 @@ public:
 
   /// Without what viscosity adds [J].
   double elasticEnergy(const PointVector& x);
-  ClothEvaluation energy(const PointVector& x);
   /// Overwrites gradient().
   ClothEvaluation evaluate(const PointVector& x);
   /// The same with matrix(). `from`: see PointTerm::addHessian().
@@ -101,7 +99,6 @@ private:
   void usePattern();
   void setWeights(double tau, double ratio);
   void respond(double ratio);
-  double loadPotential(const PointVector& x) const;
   /// Inertia and loads: adds their gradient to gradient_; returns their potential.
   double addLoads(const PointVector& x);
   /// In counts per point.

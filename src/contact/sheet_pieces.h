@@ -44,7 +44,6 @@ struct SheetPieces
 
   void build(const ContactSurface& surface);
   bool empty() const { return triangles == 0; }
-  bool isEdgeOfSegment(int edge) const { return edge < segments; }
   /// The segment or triangle of an element.
   int triangleOf(int element) const { return element - segments; }
 

@@ -162,11 +162,6 @@ Sample sampleVertices(const TriangleMesh& mesh, const MeshTopology& t, const Vec
 
 }   // namespace
 
-const char* toString(IsometricElement element)
-{
-  return element == IsometricElement::conforming ? "conforming" : "nonconforming";
-}
-
 PointMatrix isometricBending(const TriangleMesh& mesh, const MeshTopology& t, IsometricElement element,
                              double coefficient, const std::vector<char>& clamped)
 {

@@ -44,70 +44,27 @@ Eigen::Vector3d firstDirector(const Eigen::Matrix3Xd& x, bool closed, const Eige
 FramedCurve::FramedCurve(const Eigen::Matrix3Xd& x, bool closed, const Eigen::Vector3d& director) : closed_(closed)
 {
   const Eigen::Vector3d first = firstDirector(x, closed, director);
-  const int n = static_cast<int>(x.cols());
-  t_.resize(3, closed ? n : n - 1);
-  u_.resize(3, t_.cols());
-  theta = Eigen::VectorXd::Zero(t_.cols());
-  reference_twist_ = Eigen::VectorXd::Zero(n);
-  t_ = tangentsOf(x);
-  x_ = x;
+  t_.resize(3, closed ? x.cols() : x.cols() - 1);
+  u_.resize(3, edges());
+  theta = Eigen::VectorXd::Zero(edges());
+  for (int j = 0; j < edges(); ++j)
+    t_.col(j) = tangentOf(x, j);
+  const auto carried = [&](int to) -> Eigen::Vector3d {
+    return parallelTransport(u_.col(before(to)), t_.col(before(to)), t_.col(to));
+  };
   u_.col(0) = first;
-  makeSpaceParallel();
-}
-
-Eigen::Matrix3Xd FramedCurve::tangentsOf(const Eigen::Matrix3Xd& x) const
-{
-  Eigen::Matrix3Xd t(3, edges());
-  for (int j = 0; j < edges(); ++j)
-    t.col(j) = tangentOf(x, j);
-  return t;
-}
-
-void FramedCurve::moveTo(const Eigen::Matrix3Xd& x)
-{
-  if (x.cols() != x_.cols())
-    throw std::invalid_argument("moveTo: expected " + std::to_string(x_.cols()) + " nodes, got " +
-                                std::to_string(x.cols()));
-  const Eigen::Matrix3Xd old = t_, moved = tangentsOf(x);
-  for (int j = 0; j < edges(); ++j)
-    if (1.0 + old.col(j).dot(moved.col(j)) < kFolded)
-      throw std::invalid_argument("edge " + std::to_string(j) + " turned over in one move; move in smaller steps");
-  t_ = moved;
-  x_ = x;
-  for (int j = 0; j < edges(); ++j)
+  for (int j = 1; j < edges(); ++j)
   {
-    const Eigen::Vector3d u = parallelTransport(u_.col(j), old.col(j), t_.col(j));
-    u_.col(j) = (u - u.dot(t_.col(j)) * t_.col(j)).normalized();
+    const Eigen::Vector3d p = carried(j);
+    u_.col(j) = (p - p.dot(t_.col(j)) * t_.col(j)).normalized();
   }
-  for (int i = 0; i < nodes(); ++i)
-    if (hasJoint(i))
-    {
-      const Eigen::Vector3d p = parallelTransport(u_.col(before(i)), t_.col(before(i)), t_.col(i));
-      reference_twist_[i] = unwrapNear(signedAngle(p, u_.col(i), t_.col(i)), reference_twist_[i]);
-    }
-}
-
-void FramedCurve::makeSpaceParallel()
-{
-  double turned = 0.0;   // of the old reference frame of an edge against the new one
-  for (int i = 1; i < edges(); ++i)
-  {
-    const Eigen::Vector3d p = parallelTransport(u_.col(i - 1), t_.col(i - 1), t_.col(i));
-    turned += reference_twist_[i];
-    u_.col(i) = (p - p.dot(t_.col(i)) * t_.col(i)).normalized();
-    theta[i] += turned;
-    reference_twist_[i] = 0.0;
-  }
-  if (closed_)
-  {
-    const Eigen::Vector3d p = parallelTransport(u_.col(edges() - 1), t_.col(edges() - 1), t_.col(0));
-    reference_twist_[0] = unwrapNear(signedAngle(p, u_.col(0), t_.col(0)), reference_twist_[0] + turned);
-  }
+  if (closed)
+    holonomy_ = signedAngle(carried(0), u_.col(0), t_.col(0));
 }
 
 double FramedCurve::twist(int joint) const
 {
-  return hasJoint(joint) ? theta[joint] - theta[before(joint)] + reference_twist_[joint] : 0.0;
+  return hasJoint(joint) ? theta[joint] - theta[before(joint)] + (joint == 0 ? holonomy_ : 0.0) : 0.0;
 }
 
 Eigen::Vector3d FramedCurve::curvatureBinormal(int joint) const

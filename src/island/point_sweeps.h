@@ -4,7 +4,7 @@
 
 #include "slender_sim/linalg/block_matrix.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
-#include "slender_sim/linalg/symmetric_sweeps.h"
+#include "linalg/symmetric_sweeps.h"
 
 namespace slender {
 

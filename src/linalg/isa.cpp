@@ -33,6 +33,4 @@ Isa bestIsa()
 #endif
 }
 
-const char* toString(Isa isa) { return isa == Isa::avx512 ? "avx512" : isa == Isa::avx2 ? "avx2" : "baseline"; }
-
 }   // namespace slender

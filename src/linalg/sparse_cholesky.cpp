@@ -338,15 +338,6 @@ void SparseCholesky::backwardPoints(double* y, double* x) const
 
 int SparseCholesky::size() const { return static_cast<int>(impl_->starts.size()) - 1; }
 double* SparseCholesky::values() { return impl_->values.data(); }
-const std::vector<int>& SparseCholesky::starts() const { return impl_->starts; }
-const std::vector<int>& SparseCholesky::rows() const { return impl_->rows; }
-
-int SparseCholesky::index(int row, int column) const
-{
-  const auto begin = impl_->rows.begin();
-  return static_cast<int>(std::lower_bound(begin + impl_->starts[column], begin + impl_->starts[column + 1], row) -
-                          begin);
-}
 
 bool SparseCholesky::factor()
 {

@@ -131,16 +131,4 @@ void TrackingInputs::repeat(const Input& input)
     throw std::runtime_error("its guide " + input.name + " cannot be taken; the scene is not the recorded one");
 }
 
-void TrackingInputs::skip(double seconds)
-{
-  for (Guide& guide : guides_)
-  {
-    guide.gap_start += seconds;
-    if (guide.points)
-      guide.points->skip(seconds);
-    for (GuideBuffer& body : guide.bodies)
-      body.skip(seconds);
-  }
-}
-
 }   // namespace slender

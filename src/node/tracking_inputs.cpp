@@ -17,6 +17,19 @@ bool withinReach(const Eigen::Matrix3Xd& points)
   return points.cols() == 0 || points.cwiseAbs().maxCoeff() <= kMaxCoordinate;
 }
 
+/// Calls f(buffer) for the buffers of guides: one of the points, or one per body.
+template <class Guides, class F>
+void forBuffers(Guides& guides, const F& f)
+{
+  for (auto& guide : guides)
+  {
+    if (guide.points)
+      f(*guide.points);
+    for (auto& body : guide.bodies)
+      f(body);
+  }
+}
+
 const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index, bool of_rod)
 {
   return of_rod ? simulation.state().rod_guides[index].points : simulation.state().cloth_guides[index].points;
@@ -129,25 +142,20 @@ double TrackingInputs::wantedLag() const
     if (buffer.lastTime() && clock_.seconds() - *buffer.lastTime() <= options_.guide_timeout)
       lag = std::max(lag, buffer.timing().wantedLag());
   };
-  for (const Guide& guide : guides_)
-  {
-    if (guide.points)
-      ask(*guide.points);
-    for (const GuideBuffer& body : guide.bodies)
-      ask(body);
-  }
+  forBuffers(guides_, ask);
   return lag;
 }
 
 void TrackingInputs::lagAtLeast(double lag)
 {
+  forBuffers(guides_, [lag](auto& buffer) { buffer.lagAtLeast(lag); });
+}
+
+void TrackingInputs::skip(double seconds)
+{
   for (Guide& guide : guides_)
-  {
-    if (guide.points)
-      guide.points->lagAtLeast(lag);
-    for (GuideBuffer& body : guide.bodies)
-      body.lagAtLeast(lag);
-  }
+    guide.gap_start += seconds;
+  forBuffers(guides_, [seconds](auto& buffer) { buffer.skip(seconds); });
 }
 
 void TrackingInputs::onPoints(int guide, const sensor_msgs::PointCloud2& message)

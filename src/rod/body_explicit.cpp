@@ -67,7 +67,7 @@ void BodyPart::addForces(Eigen::Vector3d& force, Eigen::Vector3d& torque) const
     force += m.mass * gravity;
   torque += (now_.X_WB.position - centre).cross(force);
   forCarried([&](const Carried& carried, const GraspState& g) {
-    const RodStepper::Impl& rod = *carried.rod;
+    const RodWork& rod = *carried.rod;
     const Wrench& wrench = rod.wrenches[carried.grasp];
     force += wrench.force;
     torque += wrench.torque + (g.X_WG.position - centre).cross(wrench.force);

@@ -6,7 +6,7 @@
 #include "linalg/cholesky6.h"
 #include "body_surface.h"
 #include "body_system.h"
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 #include "slender_sim/dynamics/fast_projection.h"
 
 namespace slender {
@@ -24,7 +24,7 @@ public:
   /// A grasp of a rod that follows a body; X_BG: its frame in that of the body.
   struct Carried
   {
-    const RodStepper::Impl* rod;
+    const RodWork* rod;
     int grasp;
     Pose X_BG;
   };

@@ -9,7 +9,7 @@ namespace slender {
 
 /// Forces as the substep begins, and the velocities and positions that free nodes have by them alone; held nodes are
 /// put where their grasps will be.
-StepFailure RodStepper::Impl::explicitPredict(const Substep& next_substep, StepReport& report)
+StepFailure RodWork::explicitPredict(const Substep& next_substep, StepReport& report)
 {
   substep = next_substep;
   const int n = model->nodes();
@@ -37,7 +37,7 @@ StepFailure RodStepper::Impl::explicitPredict(const Substep& next_substep, StepR
   return StepFailure::none;
 }
 
-RodEvaluation RodStepper::Impl::evaluateStart()
+RodEvaluation RodWork::evaluateStart()
 {
   if (isotropic)
     return isotropic->evaluate(work);
@@ -61,7 +61,7 @@ RodEvaluation RodStepper::Impl::evaluateStart()
 }
 
 /// What the rod's elasticity and its loads do to the grippers, and to the bodies that carry it, as the substep begins.
-void RodStepper::Impl::elasticWrenches()
+void RodWork::elasticWrenches()
 {
   wrenches.assign(wrenches.size(), Wrench());
   addToWrenches([&](int i) { return nodeForce(i); }, true);
@@ -73,7 +73,7 @@ void RodStepper::Impl::elasticWrenches()
 
 /// Positions and velocities of held nodes at an instant; those of grasps that bodies carry follow stage_poses and
 /// carried_velocity.
-void RodStepper::Impl::holdNodes(double at)
+void RodWork::holdNodes(double at)
 {
   for (std::size_t k = 0; k < next.grasps.size(); ++k)
   {
@@ -93,7 +93,7 @@ void RodStepper::Impl::holdNodes(double at)
 }
 
 /// End of the substep at the nodes' final positions: frames, twists, reactions, checks.
-StepFailure RodStepper::Impl::explicitFinish()
+StepFailure RodWork::explicitFinish()
 {
   const int n = model->nodes();
   const double h = substep.length;

@@ -5,7 +5,7 @@
 
 #include "island/chain_part.h"
 #include "body_part.h"
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 #include "slender_sim/contact/contact_properties.h"
 
 namespace slender {
@@ -15,7 +15,7 @@ class RodPart : public ChainPart
 {
 public:
   /// averages: the matrix C of AverageConstraints, count x nodes; null: no averages are prescribed.
-  RodPart(RodStepper::Impl& rod, bool touches, const AverageConstraints::Matrix* averages = nullptr)
+  RodPart(RodWork& rod, bool touches, const AverageConstraints::Matrix* averages = nullptr)
     : ChainPart(rod.system),
       rod_(rod),
       touches_(touches),
@@ -33,7 +33,7 @@ public:
     Pose X_BG;
   };
   void addWeld(const Weld& weld);
-  RodStepper::Impl& rod() const { return rod_; }
+  RodWork& rod() const { return rod_; }
   /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
   bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
 
@@ -121,7 +121,7 @@ private:
   /// After a stage: poses and velocities of the grasps that bodies carry.
   void takeCarriedMotion();
 
-  RodStepper::Impl& rod_;
+  RodWork& rod_;
   const bool touches_;
   const double shortest_edge_;   ///< at rest [m]
   ContactProperties contact_;

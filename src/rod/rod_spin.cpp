@@ -1,17 +1,17 @@
 // Here the edges of a rod get inertia about their tangents in implicit substeps. Rods that friction does not turn have
 // no such inertia: their frames are in equilibrium at every instant (thesis 4.3).
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 
 namespace slender {
 
-void RodStepper::Impl::keepSpins()
+void RodWork::keepSpins()
 {
   spins = true;
   system.keepSpins();
 }
 
 /// Does what combine() does for positions, for the turn of an edge since the substep began.
-double RodStepper::Impl::combineTurn(const Combination& c, int j) const
+double RodWork::combineTurn(const Combination& c, int j) const
 {
   double sum = c[kV] * work.spin[j];
   if (c[kA] != 0)
@@ -24,7 +24,7 @@ double RodStepper::Impl::combineTurn(const Combination& c, int j) const
 }
 
 /// Completes the state: spins and memory of spins that it does not have yet are zero.
-void RodStepper::Impl::beginSpins()
+void RodWork::beginSpins()
 {
   const bool multistep = work.x_previous.cols() > 0, accelerated = work.a.cols() > 0;
   const auto complete = [&](Eigen::VectorXd& v) {
@@ -43,7 +43,7 @@ void RodStepper::Impl::beginSpins()
   stage_spin.resize(model->edges());
 }
 
-void RodStepper::Impl::beginSpinStage(std::size_t s, double h)
+void RodWork::beginSpinStage(std::size_t s, double h)
 {
   const Stage& stage = plan->stages[s];
   const double inertia = 1.0 / (stage.tau_a * stage.tau_a), damping = model->mass_damping / stage.tau_v;
@@ -56,7 +56,7 @@ void RodStepper::Impl::beginSpinStage(std::size_t s, double h)
   }
 }
 
-void RodStepper::Impl::endSpinStage(std::size_t s)
+void RodWork::endSpinStage(std::size_t s)
 {
   const Stage& stage = plan->stages[s];
   for (int j = 0; j < model->edges(); ++j)
@@ -66,7 +66,7 @@ void RodStepper::Impl::endSpinStage(std::size_t s)
   }
 }
 
-void RodStepper::Impl::finishSpins()
+void RodWork::finishSpins()
 {
   const Stage& stage = plan->stages.back();
   for (int j = 0; j < model->edges(); ++j)

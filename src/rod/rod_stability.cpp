@@ -16,7 +16,7 @@ namespace {
 class RodPencil
 {
 public:
-  explicit RodPencil(RodStepper::Impl& rod) : rod_(rod)
+  explicit RodPencil(RodWork& rod) : rod_(rod)
   {
     const RodModel& m = *rod.model;
     double inertia = 0.0;
@@ -115,7 +115,7 @@ private:
       v[v.size() - 1] = 0.0;
   }
 
-  RodStepper::Impl& rod_;
+  RodWork& rod_;
   double edge_inertia_ = 0.0, spin_ = 0.0, unit_ = 0.0;
 };
 
@@ -135,7 +135,7 @@ void scaleToTurns(const RodModel& model, Eigen::VectorXd& v)
 
 }   // namespace
 
-RodStability assessStability(RodStepper::Impl& rod, bool spectrum)
+RodStability assessStability(RodWork& rod, bool spectrum)
 {
   RodStability result;
   rod.system.load(rod.work);

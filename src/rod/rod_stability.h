@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 #include "slender_sim/dynamics/equilibrium_search.h"
 
 namespace slender {
@@ -17,6 +17,6 @@ struct RodStability : EquilibriumStability
 };
 
 /// Of the configuration rod.work under its inputs. `spectrum` false: only the energy.
-RodStability assessStability(RodStepper::Impl& rod, bool spectrum);
+RodStability assessStability(RodWork& rod, bool spectrum);
 
 }   // namespace slender

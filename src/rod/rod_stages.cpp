@@ -1,12 +1,12 @@
 // Parts of an implicit substep of one rod (thesis 4.6.2).
 #include <algorithm>
 
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
 
-StepFailure RodStepper::Impl::computeAcceleration()
+StepFailure RodWork::computeAcceleration()
 {
   // at the start of a run: frames to equilibrium, then a = M^-1 F
   system.setResponse(0.0, nullptr);
@@ -29,7 +29,7 @@ StepFailure RodStepper::Impl::computeAcceleration()
   return StepFailure::none;
 }
 
-StepFailure RodStepper::Impl::beginSubstep(const StepPlan& step_plan, const Substep& next_substep)
+StepFailure RodWork::beginSubstep(const StepPlan& step_plan, const Substep& next_substep)
 {
   plan = &step_plan;
   substep = next_substep;
@@ -55,7 +55,7 @@ StepFailure RodStepper::Impl::beginSubstep(const StepPlan& step_plan, const Subs
 }
 
 /// Inertia and loads of a stage, and as its trial configuration the motion carried on.
-void RodStepper::Impl::beginStage(std::size_t s)
+void RodWork::beginStage(std::size_t s)
 {
   const Stage& stage = plan->stages[s];
   const double h = substep.length;
@@ -81,7 +81,7 @@ void RodStepper::Impl::beginStage(std::size_t s)
 }
 
 /// Takes over the solution of a stage that is not the last.
-void RodStepper::Impl::endStage(std::size_t s)
+void RodWork::endStage(std::size_t s)
 {
   const Stage& stage = plan->stages[s];
   for (int i = 0; i < model->nodes(); ++i)
@@ -98,7 +98,7 @@ void RodStepper::Impl::endStage(std::size_t s)
 }
 
 /// End of the step from its last stage: positions, velocities, accelerations, frames, reactions, history.
-void RodStepper::Impl::finish(StepReport& report)
+void RodWork::finish(StepReport& report)
 {
   const int n = model->nodes();
   const Stage& stage = plan->stages.back();
@@ -156,7 +156,7 @@ void RodStepper::Impl::finish(StepReport& report)
   next.last_step = h;
 }
 
-Eigen::Vector3d RodStepper::Impl::heldVelocity(double at, int node, const Eigen::Vector3d& otherwise)
+Eigen::Vector3d RodWork::heldVelocity(double at, int node, const Eigen::Vector3d& otherwise)
 {
   if (system.isFree(node))
     return otherwise;
@@ -175,7 +175,7 @@ Eigen::Vector3d RodStepper::Impl::heldVelocity(double at, int node, const Eigen:
   return otherwise;
 }
 
-Eigen::Vector3d RodStepper::Impl::combine(const Combination& c, int i) const
+Eigen::Vector3d RodWork::combine(const Combination& c, int i) const
 {
   Eigen::Vector3d sum = c[kQ] * work.x.col(i) + c[kV] * work.v.col(i);
   if (c[kA] != 0)
@@ -187,7 +187,7 @@ Eigen::Vector3d RodStepper::Impl::combine(const Combination& c, int i) const
   return sum;
 }
 
-void RodStepper::Impl::computeWrenches(double h)
+void RodWork::computeWrenches(double h)
 {
   for (std::size_t k = 0; k < wrenches.size(); ++k)
   {

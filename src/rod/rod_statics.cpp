@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "rod_stability.h"
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 #include "slender_sim/dynamics/equilibrium_search.h"
 #include "slender_sim/geometry/rotation.h"
 #include "dynamics/statics_advice.h"
@@ -12,10 +12,10 @@ namespace slender {
 
 /// The rod in the terms of EquilibriumSearch. The present configuration is rod.work. A proximal weight of 1 is 100
 /// times the stiffness of the whole rod, shared among its nodes.
-class RodStepper::Impl::RodEquilibrium
+class RodWork::RodEquilibrium
 {
 public:
-  RodEquilibrium(Impl& rod, StepReport& report);
+  RodEquilibrium(RodWork& rod, StepReport& report);
   /// Number of moves in which the grasps can be carried to their targets: each at most 2 % of the length and 0.2 rad.
   /// 0: all are there.
   double moves() const;
@@ -37,14 +37,14 @@ public:
   bool displace(double turn);
 
 private:
-  Impl& rod_;
+  RodWork& rod_;
   StepReport& report_;
   NewtonConfig newton_;
   double length_, unit_weight_;   ///< unit_weight_ [N/m]
   double twist_work_ = 0.0;       ///< of torques about tangents since the search began [J]
 };
 
-RodStepper::Impl::RodEquilibrium::RodEquilibrium(Impl& rod, StepReport& report)
+RodWork::RodEquilibrium::RodEquilibrium(RodWork& rod, StepReport& report)
   : rod_(rod),
     report_(report),
     newton_(rod.time.newton),
@@ -63,7 +63,7 @@ RodStepper::Impl::RodEquilibrium::RodEquilibrium(Impl& rod, StepReport& report)
   newton_.max_iterations = std::max(60, newton_.max_iterations);
 }
 
-double RodStepper::Impl::RodEquilibrium::moves() const
+double RodWork::RodEquilibrium::moves() const
 {
   double result = 0.0;
   for (std::size_t k = 0; k < rod_.work.grasps.size(); ++k)
@@ -76,7 +76,7 @@ double RodStepper::Impl::RodEquilibrium::moves() const
   return result;
 }
 
-NewtonResult RodStepper::Impl::RodEquilibrium::round(double fraction, double weight)
+NewtonResult RodWork::RodEquilibrium::round(double fraction, double weight)
 {
   rod_.system.load(rod_.work);
   rod_.placeAt(fraction);
@@ -95,7 +95,7 @@ NewtonResult RodStepper::Impl::RodEquilibrium::round(double fraction, double wei
   return result;
 }
 
-void RodStepper::Impl::RodEquilibrium::takeBase()
+void RodWork::RodEquilibrium::takeBase()
 {
   rod_.system.moveAlong(0.0);
   rod_.system.evaluate(false);
@@ -103,7 +103,7 @@ void RodStepper::Impl::RodEquilibrium::takeBase()
   rod_.system.store(rod_.work);
 }
 
-EquilibriumStability RodStepper::Impl::RodEquilibrium::assess(bool spectrum)
+EquilibriumStability RodWork::RodEquilibrium::assess(bool spectrum)
 {
   RodStability at = assessStability(rod_, spectrum);
   if (spectrum)
@@ -112,13 +112,13 @@ EquilibriumStability RodStepper::Impl::RodEquilibrium::assess(bool spectrum)
   return at;
 }
 
-void RodStepper::Impl::RodEquilibrium::restore(const Configuration& c)
+void RodWork::RodEquilibrium::restore(const Configuration& c)
 {
   rod_.work = c.state;
   twist_work_ = c.twist_work;
 }
 
-bool RodStepper::Impl::RodEquilibrium::displace(double turn)
+bool RodWork::RodEquilibrium::displace(double turn)
 {
   rod_.system.load(rod_.work);
   rod_.placeAt(1.0);
@@ -132,7 +132,7 @@ bool RodStepper::Impl::RodEquilibrium::displace(double turn)
 }
 
 /// Loads `state` for statics. Returns false, with the report refused, when an input is not valid.
-bool RodStepper::Impl::beginStatics(const RodState& state, const RodInputs& loads, StepReport& report)
+bool RodWork::beginStatics(const RodState& state, const RodInputs& loads, StepReport& report)
 {
   std::string what;
   if (!inputsFinite(state, loads, what))
@@ -151,7 +151,7 @@ bool RodStepper::Impl::beginStatics(const RodState& state, const RodInputs& load
   return true;
 }
 
-StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& loads, bool leave_saddles)
+StepReport RodWork::solveEquilibrium(RodState& state, const RodInputs& loads, bool leave_saddles)
 {
   StepReport report;
   if (!beginStatics(state, loads, report))
@@ -179,7 +179,7 @@ StepReport RodStepper::Impl::solveEquilibrium(RodState& state, const RodInputs& 
   return report;
 }
 
-StepReport RodStepper::Impl::assessEquilibrium(const RodState& state, const RodInputs& loads)
+StepReport RodWork::assessEquilibrium(const RodState& state, const RodInputs& loads)
 {
   StepReport report;
   if (!beginStatics(state, loads, report))
@@ -196,7 +196,7 @@ StepReport RodStepper::Impl::assessEquilibrium(const RodState& state, const RodI
 /// Trial of a round: free nodes, and what the proximal term holds them to, go along with the grasps, by the
 /// displacements of the held nodes before and after them. Otherwise a move longer than an edge would fold the rod next
 /// to the grasp.
-void RodStepper::Impl::carryFreeNodes(double weight)
+void RodWork::carryFreeNodes(double weight)
 {
   const int n = model->nodes();
   const auto moved = [&](int i) { return Eigen::Vector3d(system.position(i % n) - work.x.col(i % n)); };
@@ -232,7 +232,7 @@ void RodStepper::Impl::carryFreeNodes(double weight)
 }
 
 /// Residual, strain and wrenches of the equilibrium `work`.
-void RodStepper::Impl::evaluateEquilibrium(StepReport& report)
+void RodWork::evaluateEquilibrium(StepReport& report)
 {
   system.load(work);
   placeAt(1.0);

@@ -14,7 +14,7 @@ namespace slender {
 class RodStepper::Alone
 {
 public:
-  explicit Alone(Impl& rod) : rod_(rod), part_(rod, false), island_(rod.time, false)
+  explicit Alone(RodWork& rod) : rod_(rod), part_(rod, false), island_(rod.time, false)
   {
     island_.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
     island_.setParts({&part_});
@@ -24,13 +24,13 @@ public:
   StepReport step() { return island_.step(rod_.duration, rod_.work.next_step); }
 
 private:
-  Impl& rod_;
+  RodWork& rod_;
   RodPart part_;
   Island island_;
 };
 
 RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time)
-  : impl_(std::make_unique<Impl>(std::move(model), time))
+  : work_(std::make_unique<RodWork>(std::move(model), time))
 {
 }
 RodStepper::~RodStepper() = default;
@@ -41,36 +41,36 @@ StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double dur
   StepReport report;
   std::string what;
   if (!(duration > 0) || !std::isfinite(duration))
-    return impl_->refuse(report, StepFailure::input_not_finite,
+    return work_->refuse(report, StepFailure::input_not_finite,
                          "step length must be positive and finite, got " + std::to_string(duration));
-  if (!impl_->inputsFinite(state, inputs, what))
-    return impl_->refuse(report, StepFailure::input_not_finite,
+  if (!work_->inputsFinite(state, inputs, what))
+    return work_->refuse(report, StepFailure::input_not_finite,
                          what + " is not finite or not valid; correct this input");
   if (!alone_)
-    alone_ = std::make_unique<Alone>(*impl_);
-  impl_->begin(state, inputs, duration);
+    alone_ = std::make_unique<Alone>(*work_);
+  work_->begin(state, inputs, duration);
   report = alone_->step();
   if (report.ok)
-    state = impl_->work;
+    state = work_->work;
   return report;
 }
 StepReport RodStepper::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
 {
-  return impl_->solveEquilibrium(state, inputs, leave_saddles);
+  return work_->solveEquilibrium(state, inputs, leave_saddles);
 }
 StepReport RodStepper::assessEquilibrium(const RodState& state, const RodInputs& inputs)
 {
-  return impl_->assessEquilibrium(state, inputs);
+  return work_->assessEquilibrium(state, inputs);
 }
 Eigen::Map<const Eigen::Matrix4Xd> RodStepper::lowestMode() const
 {
-  const Eigen::VectorXd& mode = impl_->lowest_mode;
+  const Eigen::VectorXd& mode = work_->lowest_mode;
   return Eigen::Map<const Eigen::Matrix4Xd>(mode.data(), 4, mode.size() / 4);
 }
-const std::vector<Wrench>& RodStepper::wrenches() const { return impl_->wrenches; }
-const RodModel& RodStepper::model() const { return *impl_->model; }
+const std::vector<Wrench>& RodStepper::wrenches() const { return work_->wrenches; }
+const RodModel& RodStepper::model() const { return *work_->model; }
 
-RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t)
+RodWork::RodWork(std::shared_ptr<const RodModel> m, const TimeConfig& t)
   : model(std::move(m)),
     time(t),
     system(*model),
@@ -82,7 +82,7 @@ RodStepper::Impl::Impl(std::shared_ptr<const RodModel> m, const TimeConfig& t)
     isotropic = std::make_unique<IsotropicRod>(*model, system);
 }
 
-void RodStepper::Impl::begin(const RodState& state, const RodInputs& step_inputs, double step_duration)
+void RodWork::begin(const RodState& state, const RodInputs& step_inputs, double step_duration)
 {
   inputs = &step_inputs;
   duration = step_duration;
@@ -100,7 +100,7 @@ void RodStepper::Impl::begin(const RodState& state, const RodInputs& step_inputs
     addFrames(*model, work);
 }
 
-void RodStepper::Impl::accept()
+void RodWork::accept()
 {
   for (std::size_t k = 0; k < next.grasps.size(); ++k)
   {
@@ -118,7 +118,7 @@ void RodStepper::Impl::accept()
   std::swap(work, next);
 }
 
-bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const
+bool RodWork::inputsFinite(const RodState& state, const RodInputs& inputs, std::string& what) const
 {
   const int nodes = model->nodes();
   // names are built only when they are needed: a good step takes no memory
@@ -181,7 +181,7 @@ bool RodStepper::Impl::inputsFinite(const RodState& state, const RodInputs& inpu
          check(framesFit(*model, state) && (state.framed() || without_frames), "the set of material frames");
 }
 
-double RodStepper::Impl::startEnergy(double* allowance)
+double RodWork::startEnergy(double* allowance)
 {
   system.load(work);
   system.setResponse(0.0, nullptr);
@@ -190,7 +190,7 @@ double RodStepper::Impl::startEnergy(double* allowance)
 
 /// Elastic (as evaluated) plus kinetic energy and the loads' potential. `allowance`: growth that errors of a sound step
 /// may show.
-double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodEvaluation& e, double* allowance) const
+double RodWork::mechanicalEnergy(const RodState& s, const RodEvaluation& e, double* allowance) const
 {
   double kinetic = 0.0, potential = 0.0, weight = 0.0;
   for (int i = 0; i < model->nodes(); ++i)
@@ -207,12 +207,12 @@ double RodStepper::Impl::mechanicalEnergy(const RodState& s, const RodEvaluation
   return e.stretch + e.bend_twist + potential + kinetic;
 }
 
-StepReport RodStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message)
+StepReport RodWork::refuse(StepReport& report, StepFailure failure, const std::string& message)
 {
   return report.refuse(failure, "rod '" + model->name + "': " + message);
 }
 
-std::string RodStepper::Impl::explainFailure(StepFailure failure, double length) const
+std::string RodWork::explainFailure(StepFailure failure, double length) const
 {
   const bool explicit_step = isExplicit(time.integrator);
   const std::string at = " at a step of " + milliseconds(length);
@@ -254,7 +254,7 @@ std::string RodStepper::Impl::explainFailure(StepFailure failure, double length)
   }
 }
 
-Largest RodStepper::Impl::unbalancedForce() const
+Largest RodWork::unbalancedForce() const
 {
   Largest force;
   for (int i = 0; i < system.arrays().nodes; ++i)   // none before the first load()
@@ -263,7 +263,7 @@ Largest RodStepper::Impl::unbalancedForce() const
   return force;
 }
 
-void RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length, const std::string& why)
+void RodWork::refuseUnsolved(StepReport& report, StepFailure failure, double length, const std::string& why)
 {
   const bool explicit_step = isExplicit(time.integrator);
   // explicit steps end in a state that says nothing; that at their start shows what is about to blow up
@@ -293,7 +293,7 @@ void RodStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, d
   refuse(report, failure, (why.empty() ? explainFailure(failure, length) : why) + text);
 }
 
-void RodStepper::Impl::placeAt(double fraction)
+void RodWork::placeAt(double fraction)
 {
   for (std::size_t k = 0; k < stage_poses.size(); ++k)
     if (work.grasps[k].active && work.grasps[k].body < 0)
@@ -302,7 +302,7 @@ void RodStepper::Impl::placeAt(double fraction)
 }
 
 /// load per node that does not depend on the configuration: weight, wind drag, extra forces
-Eigen::Vector3d RodStepper::Impl::load(int i) const
+Eigen::Vector3d RodWork::load(int i) const
 {
   Eigen::Vector3d f = model->mass[i] * inputs->gravity;
   if (model->drag.size() > 0)
@@ -314,10 +314,10 @@ Eigen::Vector3d RodStepper::Impl::load(int i) const
 
 RodEnergies RodStepper::energies(const RodState& state, const Eigen::Vector3d& gravity) const
 {
-  return impl_->energies(state, gravity);
+  return work_->energies(state, gravity);
 }
 
-RodEnergies RodStepper::Impl::energies(const RodState& state, const Eigen::Vector3d& gravity)
+RodEnergies RodWork::energies(const RodState& state, const Eigen::Vector3d& gravity)
 {
   const RodModel& m = *model;
   RodEnergies result;

@@ -1,11 +1,11 @@
 // Rayleigh stiffness damping: every strain s gets the extra force stiffness_damping * k * ds/dt (thesis 5.3.1). A
 // stage's rate is (s - s~) / tau_v with s~ the stage's own combination of past strains, so the damping has the
 // integrator's order.
-#include "rod_stepper_impl.h"
+#include "rod_work.h"
 
 namespace slender {
 
-void RodStepper::Impl::startStrainHistory()
+void RodWork::startStrainHistory()
 {
   placeAt(substep.from / duration);
   system.evaluate(false);
@@ -19,7 +19,7 @@ void RodStepper::Impl::startStrainHistory()
 /// A stage inside the step lies on the chord between the step's ends, but its strain does not lie on the chord of their
 /// strains, which is what its backward difference means. That sag, second order in the step, is taken from the step
 /// before.
-void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
+void RodWork::setViscousResponse(const Stage& stage, double h)
 {
   const Combination& c = stage.q_tilde;
   if (plan->fraction == 1.0)
@@ -44,7 +44,7 @@ void RodStepper::Impl::setViscousResponse(const Stage& stage, double h)
 /// For frames that are carried from a stage inside the step to its end, by TR-BDF2: the strain at the stage's time by
 /// the trapezoidal rule (the stage's own strain is a point on a chord, one order worse), then the two-step backward
 /// difference. Second order, and damped however fast the frames relax.
-void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
+void RodWork::setViscousResponseAtEnd(const Stage& stage, double h)
 {
   const double c = plan->fraction, r = (1 - c) / c, weight = (1 + r) * (1 + r) / (1 + 2 * r);
   strain_end = strain_start + (0.5 * c * h) * (work.strain_rate + (strain_stage - strain_reference) / stage.tau_v);
@@ -52,7 +52,7 @@ void RodStepper::Impl::setViscousResponseAtEnd(const Stage& stage, double h)
   system.setResponse(model->stiffness_damping * (1 + 2 * r) / ((1 + r) * (1 - c) * h), &strain_end);
 }
 
-void RodStepper::Impl::finishStrainHistory(const Stage& stage)
+void RodWork::finishStrainHistory(const Stage& stage)
 {
   system.strains(strain_end);
   const double c = plan->fraction;

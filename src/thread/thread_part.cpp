@@ -4,20 +4,21 @@
 
 namespace slender {
 
-void ThreadPart::begin(double from, double to, double h)
+void ThreadPart::noteEnds()
 {
-  from_ = from;
-  to_ = to;
   share_ = 1.0;
   const ThreadState& work = thread_.work;
   end_.resize(static_cast<std::size_t>(points()));
   for (int i = 0; i < points(); ++i)
-    end_[i] =
-        nodeOf(i) < 0 ? Eigen::Vector3d(work.x[i] + h * thread_.inputs().belt_velocity) : system_.position(nodeOf(i));
+    end_[i] = nodeOf(i) < 0 ? Eigen::Vector3d(work.x[i] + thread_.substep.length * thread_.inputs->belt_velocity)
+                            : system_.position(nodeOf(i));
 }
 
-void ThreadPart::holdLanded()
+/// Nodes that met the floor are held there: they go there from the base.
+void ThreadPart::holdMore()
 {
+  if (!thread_.stopLanding())
+    return;
   for (int i = 0; i < points(); ++i)
     if (isHeld(i))
       end_[i] = system_.position(nodeOf(i));
@@ -40,7 +41,8 @@ bool ThreadPart::numberUnknowns()
 
 void ThreadPart::placeHeld(double fraction)
 {
-  share_ = to_ > from_ && fraction < to_ ? std::max(0.0, (fraction - from_) / (to_ - from_)) : 1.0;
+  const double from = thread_.substep.from / thread_.duration, to = thread_.substep.to / thread_.duration;
+  share_ = to > from && fraction < to ? std::max(0.0, (fraction - from) / (to - from)) : 1.0;
   for (int i = 0; i < points(); ++i)
     if (isHeld(i))
       thread_.placeNode(i, share_ < 1.0 ? lying(i) : end_[i]);

@@ -4,7 +4,7 @@
 
 #include "island/chain_part.h"
 #include "slender_sim/contact/contact_properties.h"
-#include "thread_stepper_impl.h"
+#include "thread_work.h"
 
 namespace slender {
 
@@ -13,13 +13,9 @@ namespace slender {
 class ThreadPart : public ChainPart
 {
 public:
-  explicit ThreadPart(ThreadStepper::Impl& thread) : ChainPart(thread.system), thread_(thread) {}
+  explicit ThreadPart(ThreadWork& thread) : ChainPart(thread.system), thread_(thread) {}
 
-  ThreadStepper::Impl& thread() const { return thread_; }
-  /// A substep of h seconds between these fractions of the step, after the thread's prepare().
-  void begin(double from, double to, double h);
-  /// Nodes have been held where they met the floor: they go there from the base.
-  void holdLanded();
+  ThreadWork& thread() const { return thread_; }
 
   /// What the thread touches; without a call nothing. `owner` is the number of the thread of which it is a part.
   /// `merging`: as WorldModel::Thread::merging.
@@ -34,7 +30,6 @@ public:
   int owner() const { return owner_; }
   /// In the steps below: what a change of shape may not come near (null: nothing).
   void setGuard(const RemeshGuard* guard) { guard_ = guard; }
-  void setDuration(double duration) { duration_ = duration; }   ///< of the step [s]
   int points() const override { return touches_ ? thread_.work.nodes() : 0; }
   void addSurface(ContactSurface& surface) const override;
 
@@ -57,8 +52,12 @@ private:
   BarrierRange barrierRange(double gap) const override;
   bool meetsMore() override { return thread_.firstLanding() <= 1.0; }
   void holdMore() override;
-  StepFailure predict(const Substep& substep, StepReport& report) override;
-  StepFailure finishSubstep(StepReport& report) override;
+  StepFailure predict(const Substep& substep, StepReport&) override { return thread_.explicitPredict(substep); }
+  StepFailure finishSubstep(StepReport&) override
+  {
+    thread_.finish();
+    return StepFailure::none;
+  }
   StepFailure changeMesh() override { return thread_.changeMesh(guard_); }
   void acceptSubstep(const Substep&) override {}   // finishSubstep() changed the present state
   bool shorterMayHelp(StepFailure failure) const override;
@@ -67,17 +66,17 @@ private:
   Largest unbalancedForce() const override { return thread_.unbalancedForce(); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
 
+  /// Keeps where nodes that are held or lie will be at the end of the substep, once it has begun.
+  void noteEnds();
   bool isHeld(int node) const { return nodeOf(node) >= 0 && !system_.isFree(nodeOf(node)); }
   Eigen::Vector3d lying(int node) const { return thread_.work.x[node] + share_ * (end_[node] - thread_.work.x[node]); }
 
-  ThreadStepper::Impl& thread_;
+  ThreadWork& thread_;
   bool touches_ = false;
   ContactProperties contact_;
   double merging_ = 0.0;
   int owner_ = 0;
   const RemeshGuard* guard_ = nullptr;
-  double duration_ = 1.0, length_ = 0.0;   ///< of the step and the substep [s]
-  double from_ = 0.0, to_ = 1.0;
   double share_ = 1.0;                 ///< of the substep, at which what is held stands in the trial
   std::vector<Eigen::Vector3d> end_;   ///< per node that is held or lies: its place at the end of the substep
 };

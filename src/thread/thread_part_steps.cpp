@@ -7,10 +7,9 @@ namespace slender {
 
 StepFailure ThreadPart::beginSubstep(const StepPlan&, const Substep& substep)
 {
-  length_ = substep.length;
-  const StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
+  const StepFailure failure = thread_.beginSubstep(substep);
   if (failure == StepFailure::none)
-    begin(substep.from / duration_, substep.to / duration_, substep.to - substep.from);
+    noteEnds();
   return failure;
 }
 
@@ -19,9 +18,6 @@ void ThreadPart::addSurface(ContactSurface& surface) const
   if (!touches_)
     return;
   const ThreadState& state = thread_.work;
-  const auto isHeld = [&](int i) {
-    return state.deposited[i] || (i == 0 && state.ends[0].held) || (i + 1 == state.nodes() && state.ends[1].held);
-  };
   ContactSegment s;
   s.object = static_cast<int>(surface.objects.size());
   s.core = merging_ > 0.0 ? merging_ : 1.0;
@@ -31,7 +27,7 @@ void ThreadPart::addSurface(ContactSurface& surface) const
     s.b = surface.points + j + 1;
     s.radius = state.radius(j);
     s.length = state.edge(j).norm();
-    s.driven = static_cast<unsigned char>(isHeld(j) + 2 * isHeld(j + 1));
+    s.driven = static_cast<unsigned char>(thread_.isHeld(j) + 2 * thread_.isHeld(j + 1));
     surface.segments.push_back(s);
     s.start += s.length;
   }
@@ -60,38 +56,16 @@ BoundingBox ThreadPart::surfaceBox(double ahead) const
 /// the barrier is.
 BarrierRange ThreadPart::barrierRange(double gap) const
 {
-  const double h = length_, gravity = thread_.inputs().gravity.norm();
+  const double h = thread_.substep.length, duration = thread_.duration, gravity = thread_.inputs->gravity.norm();
   const RodArrays& a = system_.arrays();
   BarrierRange range;
   for (int i = 0; i < a.nodes; ++i)
-    range.least = std::max(range.least, a.weight[i] * h * h * std::max(gravity, gap / (duration_ * duration_)));
+    range.least = std::max(range.least, a.weight[i] * h * h * std::max(gravity, gap / (duration * duration)));
   double length = 0.0;
   for (int j = 0; j < thread_.work.edges(); ++j)
     length += thread_.work.edge(j).norm();
-  range.most = 3.0 * thread_.model->viscosity * thread_.work.totalVolume() / (length * duration_);
+  range.most = 3.0 * thread_.model->viscosity * thread_.work.totalVolume() / (length * duration);
   return range;
-}
-
-void ThreadPart::holdMore()
-{
-  if (const double earliest = thread_.firstLanding(); earliest <= 1.0)
-  {
-    thread_.stopLanding(length_, earliest);
-    holdLanded();
-  }
-}
-
-StepFailure ThreadPart::predict(const Substep& substep, StepReport&)
-{
-  length_ = substep.to - substep.from;
-  const StepFailure failure = thread_.prepare(substep.from, substep.to, duration_);
-  return failure == StepFailure::none ? thread_.move(length_) : failure;
-}
-
-StepFailure ThreadPart::finishSubstep(StepReport&)
-{
-  thread_.takeOver(length_);
-  return StepFailure::none;
 }
 
 /// A shorter substep would hide that all of them are too long, or it would draw the thread out or thicken it bit by

@@ -16,22 +16,21 @@ namespace slender {
 class ThreadStepper::Alone
 {
 public:
-  explicit Alone(Impl& thread) : part_(thread), island_(timeOf(thread), false)
+  explicit Alone(ThreadWork& thread) : part_(thread), island_(timeOf(thread), false)
   {
     island_.equations().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
     island_.setParts({&part_});
   }
 
   /// From what the thread has loaded.
-  StepReport step(double duration)
+  StepReport step()
   {
-    part_.setDuration(duration);
     double first = 0.0;
-    return island_.step(duration, first);
+    return island_.step(part_.thread().duration, first);
   }
 
 private:
-  static TimeConfig timeOf(const Impl& thread)
+  static TimeConfig timeOf(const ThreadWork& thread)
   {
     TimeConfig time;
     time.integrator = thread.explicit_step ? Integrator::symplectic_euler : Integrator::implicit_euler;
@@ -70,8 +69,8 @@ ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const New
   if (integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler)
     throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) +
                                 ", allowed: implicit_euler, symplectic_euler");
-  impl_ = std::make_unique<Impl>(std::move(model), newton, integrator == Integrator::symplectic_euler);
-  alone_ = std::make_unique<Alone>(*impl_);
+  work_ = std::make_unique<ThreadWork>(std::move(model), newton, integrator == Integrator::symplectic_euler);
+  alone_ = std::make_unique<Alone>(*work_);
 }
 ThreadStepper::~ThreadStepper() = default;
 ThreadStepper::ThreadStepper(ThreadStepper&&) noexcept = default;
@@ -80,18 +79,19 @@ ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {
   StepReport report;
-  if (!impl_->begin(state, inputs, duration, report))
+  if (!work_->accepts(state, inputs, duration, report))
     return report;
-  report = alone_->step(duration);
+  work_->begin(state, inputs, duration);
+  report = alone_->step();
   if (report.ok)
-    std::swap(state, impl_->work);
+    std::swap(state, work_->work);
   return report;
 }
-const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return impl_->loads; }
-const ThreadModel& ThreadStepper::model() const { return *impl_->model; }
+const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return work_->loads; }
+const ThreadModel& ThreadStepper::model() const { return *work_->model; }
 
-bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration,
-                                       std::string& what) const
+bool ThreadWork::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration,
+                              std::string& what) const
 {
   // names are built only when they are needed: a good step takes no memory
   const auto check = [&](bool good, const char* name) {
@@ -124,13 +124,13 @@ bool ThreadStepper::Impl::inputsFinite(const ThreadState& s, const ThreadInputs&
   return what.empty();
 }
 
-StepReport ThreadStepper::Impl::refuse(StepReport& report, StepFailure failure, const std::string& message) const
+std::string ThreadWork::nameOf(const ThreadState& state) const
 {
-  const std::string piece = work.thread_id > 0 ? ", piece " + std::to_string(work.thread_id) + " that broke off" : "";
-  return report.refuse(failure, "thread '" + model->name + "'" + piece + ": " + message);
+  const std::string piece = state.thread_id > 0 ? ", piece " + std::to_string(state.thread_id) + " that broke off" : "";
+  return "thread '" + model->name + "'" + piece + ": ";
 }
 
-std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double length) const
+std::string ThreadWork::explainFailure(StepFailure failure, double length) const
 {
   const std::string at = " at a step of " + milliseconds(length);
   if (failure == StepFailure::overstretched)
@@ -177,7 +177,7 @@ std::string ThreadStepper::Impl::explainFailure(StepFailure failure, double leng
 
 /// What is known of a disc, an edge that is wider in radius than long, next to a node: slender theory does not hold
 /// there, so a shorter step helps little. Empty: there is none.
-std::string ThreadStepper::Impl::explainDisc(int node) const
+std::string ThreadWork::explainDisc(int node) const
 {
   constexpr int kNear = 2;   // edges on each side: the whole stencil of the node's equations
   int disc = -1;
@@ -198,7 +198,7 @@ std::string ThreadStepper::Impl::explainDisc(int node) const
                    "breakup_radius");
 }
 
-Largest ThreadStepper::Impl::unbalancedForce() const
+Largest ThreadWork::unbalancedForce() const
 {
   Largest force;
   for (int i = std::max(first_, 0); i < work.nodes(); ++i)
@@ -207,7 +207,7 @@ Largest ThreadStepper::Impl::unbalancedForce() const
   return force;
 }
 
-StepReport ThreadStepper::Impl::refuseUnsolved(StepReport& report, StepFailure failure, double length) const
+StepReport ThreadWork::refuseUnsolved(StepReport& report, StepFailure failure, double length) const
 {
   std::string text = explainFailure(failure, length);
   const int grown = overgrownEdge();
@@ -221,43 +221,42 @@ StepReport ThreadStepper::Impl::refuseUnsolved(StepReport& report, StepFailure f
                              " of " + std::to_string(work.nodes()) + ", which was";
     text += " at " + metres(report.place.position) + (grown >= 0 ? "" : " as the step began" + explainDisc(node));
   }
-  return refuse(report, failure, text);
+  return report.refuse(failure, nameOf(work) + text);
 }
 
-bool ThreadStepper::Impl::begin(const ThreadState& state, const ThreadInputs& inputs, double duration,
-                                StepReport& report)
+bool ThreadWork::accepts(const ThreadState& state, const ThreadInputs& inputs, double duration,
+                         StepReport& report) const
 {
+  const auto refused = [&](const std::string& message) {
+    report.refuse(StepFailure::input_not_finite, nameOf(state) + message);
+    return false;
+  };
   std::string what;
   if (!inputsFinite(state, inputs, duration, what))
-  {
-    refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
-    return false;
-  }
-  inputs_ = &inputs;
-  work = state;
-  start_ends = state.ends;
-  loads = {};
-  flow_speed_ = inputs.flow_rate > 0 ? inputs.flow_rate / model->nozzleArea() : 0.0;
+    return refused(what + " is not finite or not valid; correct this input");
   if (model->floor.sticks() && state.ends[1].held && model->nozzle_diameter > 0 &&
       !(inputs.ends[1].position.z() > model->floor.height))
-  {
-    refuse(report, StepFailure::input_not_finite,
-           "the nozzle is at a height of " + millimetres(inputs.ends[1].position.z()) + ", not above its floor at " +
-               millimetres(model->floor.height) + "; keep it above");
-    return false;
-  }
+    return refused("the nozzle is at a height of " + millimetres(inputs.ends[1].position.z()) +
+                   ", not above its floor at " + millimetres(model->floor.height) + "; keep it above");
   constexpr double kMostFed = 1e4;   // edges in one step
-  if (!(flow_speed_ * duration <= kMostFed * model->feed_length))
-  {
-    refuse(report, StepFailure::input_not_finite,
-           "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or "
-           "longer feed_length");
-    return false;
-  }
+  if (!(flowSpeed(inputs) * duration <= kMostFed * model->feed_length))
+    return refused(
+        "flow rate feeds more than 10000 edges of feed_length in one step; lower it, or use a shorter step or longer "
+        "feed_length");
   return true;
 }
 
-int ThreadStepper::Impl::foldedNode(double& cosine) const
+void ThreadWork::begin(const ThreadState& state, const ThreadInputs& step_inputs, double step_duration)
+{
+  inputs = &step_inputs;
+  duration = step_duration;
+  work = state;
+  start_ends = state.ends;
+  loads = {};
+  flow_speed_ = flowSpeed(step_inputs);
+}
+
+int ThreadWork::foldedNode(double& cosine) const
 {
   for (int k = system.sharpestJoint(cosine); k >= 0; k = system.sharpestJoint(cosine))
     if (const int node = k - offset_ + first_; node > 0 && node + 1 < work.nodes())
@@ -265,36 +264,29 @@ int ThreadStepper::Impl::foldedNode(double& cosine) const
   return -1;
 }
 
-Pose ThreadStepper::Impl::endPose(int end, const ThreadInputs& inputs, double fraction) const
+Pose ThreadWork::endPose(int end, double fraction) const
 {
-  const Pose &a = start_ends[end].X_WE, &b = inputs.ends[end];
+  const Pose &a = start_ends[end].X_WE, &b = inputs->ends[end];
   if (fraction >= 1.0)
     return {b.position, b.orientation.normalized()};
   return {a.position + fraction * (b.position - a.position), a.orientation.slerp(fraction, b.orientation).normalized()};
 }
 
-StepFailure ThreadStepper::Impl::prepare(double from, double to, double duration)
+StepFailure ThreadWork::beginSubstep(const Substep& next_substep)
 {
-  const double h = to - from;
+  substep = next_substep;
   for (int end = 0; end < 2; ++end)
     if (work.ends[end].held)
-      end_poses[end] = endPose(end, *inputs_, to / duration);
+      end_poses[end] = endPose(end, substep.to / duration);
   landed.assign(work.nodes(), 0);
-  if (!loadSystem(h))
+  if (!loadSystem())
     return StepFailure::folded_back;
-  setResponse(*inputs_, h);
-  setTrial(*inputs_, h);
+  setResponse();
+  setTrial();
   return StepFailure::none;
 }
 
-void ThreadStepper::Impl::takeOver(double h)
-{
-  finish(*inputs_, h);
-  if (explicit_step)
-    push(h);
-}
-
-StepFailure ThreadStepper::Impl::changeMesh(const RemeshGuard* guard)
+StepFailure ThreadWork::changeMesh(const RemeshGuard* guard)
 {
   if (!remesh(guard))
     return StepFailure::overstretched;

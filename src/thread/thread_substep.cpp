@@ -2,16 +2,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slender_sim/dynamics/newton.h"
 #include "slender_sim/geometry/rotation.h"
 #include "slender_sim/thread/thread_remesh.h"
-#include "thread_stepper_impl.h"
+#include "thread_work.h"
 
 namespace slender {
 
 /// Sets the configuration from which the step's strains are measured. It is the present one, except at the nozzle.
 /// There the fluid moves on like a solid plug while the nozzle stands, so the last edge is longer by what flows out,
 /// and it is less turned against the nozzle. Returns false if the thread is folded.
-bool ThreadStepper::Impl::loadSystem(double h)
+bool ThreadWork::loadSystem()
 {
   const int n = work.nodes();
   int free = 0;
@@ -38,7 +39,7 @@ bool ThreadStepper::Impl::loadSystem(double h)
   if (work.ends[1].held)
   {
     const Eigen::Matrix3d section = work.ends[1].X_WE.orientation.toRotationMatrix();
-    const double advance = h * flow_speed_, length = work.edge(n - 2).norm();
+    const double advance = substep.length * flow_speed_, length = work.edge(n - 2).norm();
     const Eigen::Vector3d end = work.x[n - 1] - advance * section.col(0);
     if (advance > 0)
     {
@@ -59,7 +60,7 @@ bool ThreadStepper::Impl::loadSystem(double h)
 /// The part of an edge that is not yet below the floor: on a roll that draws the thread down, the edge between the last
 /// node taken up and the first one above stretches only there. So a node stiffens gradually as it comes down, and
 /// results do not jump when it arrives.
-double ThreadStepper::Impl::deformingShare(int j) const
+double ThreadWork::deformingShare(int j) const
 {
   constexpr double kLeast = 1e-3;
   if (work.deposited[j] == work.deposited[j + 1])
@@ -72,24 +73,24 @@ double ThreadStepper::Impl::deformingShare(int j) const
 /// Spin of edge j [rad/s] that has the section `area` [m^2] with what flows in. Fluid in the nozzle turns with the
 /// nozzle. The angular momenta of both add up. If the fluid came with the spin of the edge, a jet of thin fluid that is
 /// drawn out below its nozzle would spin faster and faster.
-double ThreadStepper::Impl::spinWithFed(int j, double area, double h) const
+double ThreadWork::spinWithFed(int j, double area) const
 {
   if (flow_speed_ == 0.0 || j + 2 < work.nodes() || !work.ends[1].held)
     return work.spin[j];
   const Eigen::Matrix3d from = work.ends[1].X_WE.orientation.toRotationMatrix(),
                         to = end_poses[1].orientation.toRotationMatrix();
   const Eigen::Vector3d t0 = -from.col(0), t = -to.col(0);
-  const double nozzle = signedAngle(parallelTransport(from.col(1), t0, t), to.col(1), t) / h;
+  const double nozzle = signedAngle(parallelTransport(from.col(1), t0, t), to.col(1), t) / substep.length;
   // a moment of inertia is half the mass times r^2, and r^2 is the area over pi
-  const double own = work.volume[j] * work.volume[j] / work.edge(j).norm(), fed = fedVolume(h) * model->nozzleArea();
-  return (own * work.spin[j] + fed * nozzle) / (volume(j, h) * area);
+  const double own = work.volume[j] * work.volume[j] / work.edge(j).norm(), fed = fedVolume() * model->nozzleArea();
+  return (own * work.spin[j] + fed * nozzle) / (volume(j) * area);
 }
 
 /// Viscous stiffnesses over the step (thesis 5.3.2), surface tension, inertia and loads; and what is held.
-void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
+void ThreadWork::setResponse()
 {
   const int n = work.nodes();
-  const double mu = model->viscosity;
+  const double mu = model->viscosity, h = substep.length;
   system.setSurfaceTension(model->surface_tension, model->surface_shape);
   // of the edge before the node: solid parts end a joint in a clamped section, whose half of the joint has no length
   double length_before = 0.0, radius_before = 0.0, volume_before = 0.0;
@@ -100,7 +101,7 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
     if (i + 1 < n)
     {
       const double length = system.restLength(k);
-      volume_after = volume(i, h);
+      volume_after = volume(i);
       if (isSolid(i))
         system.holdTurn(k);
       else
@@ -111,7 +112,7 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
         volume_after *= share;
         radius_after = std::sqrt(area / M_PI);
         system.setSpin(k, 0.5 * model->density * volume_after * radius_after * radius_after / (h * h),
-                       h * spinWithFed(i, area, h));
+                       h * spinWithFed(i, area));
       }
     }
     const bool has_joint = (i > first_ || offset_) && (i + 1 < n || work.ends[1].held);
@@ -124,7 +125,7 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
     }
     const double mass = 0.5 * model->density * (volume_before + volume_after);
     const bool held = work.deposited[i] || endHeld(i);
-    system.setInertia(k, held ? 0.0 : mass / (h * h), work.x[i] + h * work.v[i], mass * inputs.gravity);
+    system.setInertia(k, held ? 0.0 : mass / (h * h), work.x[i] + h * work.v[i], mass * inputs->gravity);
     if (held)
       system.hold(k);
     length_before = length_after;
@@ -144,11 +145,12 @@ void ThreadStepper::Impl::setResponse(const ThreadInputs& inputs, double h)
 }
 
 /// First trial: motions go on as they were; what is held is where it will be.
-void ThreadStepper::Impl::setTrial(const ThreadInputs& inputs, double h)
+void ThreadWork::setTrial()
 {
   const int n = work.nodes(), last = lastInSystem();
+  const double h = substep.length;
   for (int i = first_; i < n; ++i)
-    system.setPosition(inSystem(i), work.x[i] + h * (work.deposited[i] ? inputs.belt_velocity : work.v[i]));
+    system.setPosition(inSystem(i), work.x[i] + h * (work.deposited[i] ? inputs->belt_velocity : work.v[i]));
   if (offset_)
   {
     const Eigen::Matrix3d section = end_poses[0].orientation.toRotationMatrix();
@@ -165,13 +167,14 @@ void ThreadStepper::Impl::setTrial(const ThreadInputs& inputs, double h)
   }
 }
 
-StepFailure ThreadStepper::Impl::move(double h)
+StepFailure ThreadWork::explicitPredict(const Substep& next_substep)
 {
+  if (const StepFailure failure = beginSubstep(next_substep); failure != StepFailure::none)
+    return failure;
   for (int j = first_; j + 1 < work.nodes(); ++j)
     if (!isSolid(j))
-      system.setTurn(inSystem(j), h * work.spin[j]);
-  if (const double earliest = firstLanding(); earliest <= 1.0)
-    stopLanding(h, earliest);
+      system.setTurn(inSystem(j), substep.length * work.spin[j]);
+  stopLanding();
   const RodEvaluation there = system.evaluate(false);
   if (there.min_chi <= kFoldedChi)
     return StepFailure::folded_back;
@@ -179,9 +182,10 @@ StepFailure ThreadStepper::Impl::move(double h)
 }
 
 /// Explicit step, second half: the forces change the velocities (symplectic Euler, thesis 4.6.1).
-void ThreadStepper::Impl::push(double h)
+void ThreadWork::push()
 {
   const RodArrays& a = system.arrays();
+  const double h = substep.length;
   for (int i = first_; i < work.nodes(); ++i)
   {
     const int k = inSystem(i);
@@ -194,7 +198,7 @@ void ThreadStepper::Impl::push(double h)
 }
 
 /// Height of a node whose section touches the floor.
-double ThreadStepper::Impl::restingHeight(int i) const
+double ThreadWork::restingHeight(int i) const
 {
   if (!model->floor.touches_at_radius)
     return model->floor.height;
@@ -202,7 +206,7 @@ double ThreadStepper::Impl::restingHeight(int i) const
   return model->floor.height + 0.5 * (work.radius(std::max(i - 1, 0)) + work.radius(std::min(i, last)));
 }
 
-bool ThreadStepper::Impl::meetsFloor(int i, double& when) const
+bool ThreadWork::meetsFloor(int i, double& when) const
 {
   if (work.deposited[i] || landed[i] || endHeld(i))
     return false;
@@ -214,7 +218,7 @@ bool ThreadStepper::Impl::meetsFloor(int i, double& when) const
   return true;
 }
 
-double ThreadStepper::Impl::firstLanding() const
+double ThreadWork::firstLanding() const
 {
   double earliest = 2.0, when = 0.0;
   if (model->floor.sticks())
@@ -226,22 +230,26 @@ double ThreadStepper::Impl::firstLanding() const
 
 /// Stops the nodes that go through the floor where they meet it. From there they move with the belt. Nodes that arrive
 /// first hold back the others, so the others are looked at again after the next solution.
-void ThreadStepper::Impl::stopLanding(double h, double earliest)
+bool ThreadWork::stopLanding()
 {
   constexpr double kTogether = 0.1;   // of the step
+  const double earliest = firstLanding();
+  if (earliest > 1.0)
+    return false;
   double when = 0.0;
   for (int i = first_; i < work.nodes(); ++i)
     if (meetsFloor(i, when) && when <= earliest + kTogether)
     {
       const int k = inSystem(i);
       const Eigen::Vector3d x = work.x[i] + when * (system.position(k) - work.x[i]);
-      system.setPosition(k, x + (1.0 - when) * h * inputs_->belt_velocity);
+      system.setPosition(k, x + (1.0 - when) * substep.length * inputs->belt_velocity);
       system.hold(k);
       landed[i] = 1;
     }
+  return true;
 }
 
-void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
+void ThreadWork::placeNode(int node, const Eigen::Vector3d& x)
 {
   const int k = inSystem(node);
   const int inside = node == 0 && offset_ ? 0 : node + 1 == work.nodes() && work.ends[1].held ? k + 1 : -1;
@@ -253,7 +261,7 @@ void ThreadStepper::Impl::placeNode(int node, const Eigen::Vector3d& x)
 /// Two nodes that lie on the floor hold up an arch of nodes between them. The arch would creep down for ever, and until
 /// it has landed every younger node has to stay in the system. Its nodes are deposited where they are, as soon as all
 /// of them are nearer to the floor than a small share of the radius.
-void ThreadStepper::Impl::restBetweenLying(const Eigen::Vector3d& belt_velocity)
+void ThreadWork::restBetweenLying()
 {
   constexpr double kNear = 0.05;   // share of the radius, far below what matters for the place of a section
   if (!model->floor.sticks())
@@ -268,17 +276,17 @@ void ThreadStepper::Impl::restBetweenLying(const Eigen::Vector3d& belt_velocity)
       for (int k = lying + 1; near && k < i; ++k)
       {
         work.deposited[k] = 1;
-        work.v[k] = belt_velocity;
+        work.v[k] = inputs->belt_velocity;
       }
       lying = i;
       near = true;
     }
 }
 
-/// Takes the solution over.
-void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
+void ThreadWork::finish()
 {
   const int n = work.nodes(), last = lastInSystem();
+  const double h = substep.length;
   const RodArrays& a = system.arrays();
   for (int end = 0; end < 2; ++end)
     if (work.ends[end].held && (end == 1 || offset_))
@@ -287,16 +295,16 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
   {
     if (work.deposited[i])
     {
-      work.x[i] += h * inputs.belt_velocity;
-      work.v[i] = inputs.belt_velocity;
+      work.x[i] += h * inputs->belt_velocity;
+      work.v[i] = inputs->belt_velocity;
       continue;
     }
     const Eigen::Vector3d x = system.position(inSystem(i));
-    work.v[i] = landed[i] ? inputs.belt_velocity : Eigen::Vector3d((x - work.x[i]) / h);
+    work.v[i] = landed[i] ? inputs->belt_velocity : Eigen::Vector3d((x - work.x[i]) / h);
     work.x[i] = x;
     work.deposited[i] = landed[i];
   }
-  restBetweenLying(inputs.belt_velocity);
+  restBetweenLying();
   for (int j = first_; j + 1 < n; ++j)
   {
     const int k = inSystem(j);
@@ -312,15 +320,17 @@ void ThreadStepper::Impl::finish(const ThreadInputs& inputs, double h)
   {
     work.twist[n - 1] = a.twist[last];
     work.v[n - 1] += flow_speed_ * (end_poses[1].orientation * Eigen::Vector3d::UnitX());
-    work.volume[n - 2] += fedVolume(h);
-    work.fed_volume += fedVolume(h);
+    work.volume[n - 2] += fedVolume();
+    work.fed_volume += fedVolume();
   }
   for (int end = 0; end < 2; ++end)
     if (work.ends[end].held)
       work.ends[end].X_WE = end_poses[end];
+  if (explicit_step)
+    push();
 }
 
-EndLoad ThreadStepper::Impl::endLoad(int end) const
+EndLoad ThreadWork::endLoad(int end) const
 {
   const int node = end ? lastInSystem() : 1, inside = end ? node + 1 : 0, edge = end ? node : 0;
   const Eigen::Vector3d at = system.nodeGradient(node), beyond = system.nodeGradient(inside);
@@ -333,7 +343,7 @@ EndLoad ThreadStepper::Impl::endLoad(int end) const
 }
 
 /// The new node lies where the curve suggests, or on the edge when something is in the way.
-void ThreadStepper::Impl::split(int j, double fraction, const RemeshGuard* guard)
+void ThreadWork::split(int j, double fraction, const RemeshGuard* guard)
 {
   Eigen::Vector3d x = splitPoint(work, j, fraction);
   if (guard)
@@ -343,7 +353,7 @@ void ThreadStepper::Impl::split(int j, double fraction, const RemeshGuard* guard
 }
 
 /// Beyond this length edge j is divided.
-double ThreadStepper::Impl::longestEdge(int j) const
+double ThreadWork::longestEdge(int j) const
 {
   const ThreadLimits& limits = model->limits;
   if (!model->floor.present || limits.edge_grading == 0.0)
@@ -356,12 +366,12 @@ double ThreadStepper::Impl::longestEdge(int j) const
 /// A drop that hangs from a fine nozzle is some capillary lengths wide, whatever the nozzle; all else is not much wider
 /// than the nozzle. An edge of a thread that is wider, and wider than it is long, is fluid that piles up between two
 /// nodes which cannot move.
-int ThreadStepper::Impl::overgrownEdge() const
+int ThreadWork::overgrownEdge() const
 {
   constexpr double kWider = 5.0;
   if (model->nozzle_diameter == 0.0)
     return -1;
-  const double gravity = inputs_->gravity.norm();
+  const double gravity = inputs->gravity.norm();
   if (model->surface_tension > 0.0 && gravity == 0.0)
     return -1;
   const double capillary =
@@ -374,7 +384,7 @@ int ThreadStepper::Impl::overgrownEdge() const
   return -1;
 }
 
-bool ThreadStepper::Impl::remesh(const RemeshGuard* guard)
+bool ThreadWork::remesh(const RemeshGuard* guard)
 {
   constexpr double kMostNew = 1e4;
   const ThreadLimits& limits = model->limits;

@@ -62,7 +62,7 @@ IslandFinder::Reach ClothObject::reach() const
 void ClothObject::finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const
 {
   if (tracks())
-    takeClothGuide(world_, index, tracked_inputs_.averages, part_->stages().average_forces, inputs, state, report);
+    takeClothGuide(world_, index, tracked_inputs_.averages, part_->work().average_forces, inputs, state, report);
 }
 
 void ClothObject::addTo(Meeting& meeting, const WorldState& state)

@@ -33,11 +33,11 @@ public:
   void setThreads(int threads) override { loop_.threads = threads; }
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
   {
-    return objects_.cloths[cloth].part().stages().energies(state, gravity);
+    return objects_.cloths[cloth].part().work().energies(state, gravity);
   }
   const Eigen::Matrix3Xd& pinForces(int cloth) const override
   {
-    return objects_.cloths[cloth].part().stages().pin_forces;
+    return objects_.cloths[cloth].part().work().pin_forces;
   }
   Eigen::Matrix3Xd clothContactForces(int cloth) const override
   {

@@ -42,7 +42,7 @@ bool meetsOthers(const WorldModel& world, int rod)
 RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time)
   : WorldObject(number),
     whole(std::make_unique<RodStepper>(world.rods[number].model, time)),
-    stepper(&whole->impl()),
+    stepper(&whole->work()),
     constraints(constraintsOf(world.rods[number])),
     part(std::make_unique<RodPart>(*stepper, touches(world.rods[number]),
                                    constraints ? &constraints->matrix() : nullptr)),

@@ -27,7 +27,7 @@ public:
   void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const override;
 
   const std::unique_ptr<RodStepper> whole;
-  RodStepper::Impl* const stepper;                            ///< of `whole`
+  RodWork* const stepper;                                     ///< of `whole`
   const std::shared_ptr<const WeakConstraints> constraints;   ///< null: tracks nothing
   const std::unique_ptr<RodPart> part;
   RodInputs inputs;   ///< of the present step, with the targets of grasps that driven bodies carry

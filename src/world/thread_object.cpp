@@ -44,9 +44,10 @@ bool ThreadObject::load(const WorldState& state, const WorldInputs& inputs, Step
   {
     ThreadState& strand = work_.threads[s];
     strand.next_id = next_id;
-    if (!strands_[s].stepper->begin(strand, strand.ends[1].held ? inputs_ : still_, time_.step, report))
+    const ThreadInputs& own_inputs = strand.ends[1].held ? inputs_ : still_;
+    if (!strands_[s].stepper->accepts(strand, own_inputs, time_.step, report))
       return false;
-    strands_[s].part->setDuration(time_.step);
+    strands_[s].stepper->begin(strand, own_inputs, time_.step);
   }
   return true;
 }
@@ -56,7 +57,7 @@ void ThreadObject::makeStrands(std::size_t count)
   while (strands_.size() < count)
   {
     Strand added;
-    added.stepper = std::make_unique<ThreadStepper::Impl>(model.model, time_.newton, false);
+    added.stepper = std::make_unique<ThreadWork>(model.model, time_.newton, false);
     added.part = std::make_unique<ThreadPart>(*added.stepper);
     if (model.contact)
       added.part->setContact(*model.contact, model.merging, index);

@@ -29,7 +29,7 @@ public:
 
   struct Strand
   {
-    std::unique_ptr<ThreadStepper::Impl> stepper;
+    std::unique_ptr<ThreadWork> stepper;
     std::unique_ptr<ThreadPart> part;
   };
   /// Strands of the present step.

@@ -70,18 +70,18 @@ WorldStatics::WorldStatics(WorldObjects& objects)
 
 // ---- states of its parts
 
-void WorldStatics::take(const WorldState& state)
+/// Copies what the search is about.
+void WorldStatics::copy(const WorldState& from, WorldState& to) const
 {
-  work_.rods.resize(state.rods.size());
-  work_.bodies.resize(state.bodies.size());
+  to.rods.resize(from.rods.size());
+  to.bodies.resize(from.bodies.size());
   for (const RodObject& rod : objects_.rods)
-    work_.rods[rod.index] = state.rods[rod.index];
+    to.rods[rod.index] = from.rods[rod.index];
   for (const int b : objects_.content.bodies)
-    work_.bodies[b] = state.bodies[b];
-  work_.obstacles = state.obstacles;
-  work_.obstacle_velocities = state.obstacle_velocities;
-  work_.contact = state.contact;
-  forgetSprings();
+    to.bodies[b] = from.bodies[b];
+  to.obstacles = from.obstacles;
+  to.obstacle_velocities = from.obstacle_velocities;
+  to.contact = from.contact;
 }
 
 /// Springs are forgotten after each step of the search: friction may slow the search, and holds nothing.
@@ -90,17 +90,6 @@ void WorldStatics::forgetSprings()
   for (auto* memories : {&work_.contact.rods, &work_.contact.bodies, &work_.contact.cloths, &work_.contact.threads})
     for (ContactMemory& memory : *memories)
       memory.springs.clear();
-}
-
-void WorldStatics::give(WorldState& state) const
-{
-  for (const RodObject& rod : objects_.rods)
-    state.rods[rod.index] = work_.rods[rod.index];
-  for (const int b : objects_.content.bodies)
-    state.bodies[b] = work_.bodies[b];
-  state.obstacles = work_.obstacles;
-  state.obstacle_velocities = work_.obstacle_velocities;
-  state.contact = work_.contact;
 }
 
 void WorldStatics::restore(const Configuration& c)
@@ -249,12 +238,13 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
   if (!objects_.takeInputs(state, inputs, report_))
     return report_;
   inputs_ = &inputs;
-  take(state);
+  copy(state, work_);
+  forgetSprings();
   if (settle(time_.step))
   {
     settleStably(*this, true, report_);
     report_.message.clear();
-    give(state);
+    copy(work_, state);
     for (std::size_t r = 0; r < objects_.rods.size(); ++r)
       origin_.rods[r].stepper->wrenches = objects_.rods[r].stepper->wrenches;
     return report_;

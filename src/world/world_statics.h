@@ -39,9 +39,8 @@ private:
   StepReport step(double h);
   bool settle(double h);
   double unbalanced(double h) const;
-  void take(const WorldState& state);
+  void copy(const WorldState& from, WorldState& to) const;
   void forgetSprings();
-  void give(WorldState& state) const;
 
   // ---- stability, world_stability.cpp
   void beginStability();

@@ -45,7 +45,7 @@ public:
   };
   struct Rod
   {
-    std::unique_ptr<RodStepper::Impl> stepper;
+    std::unique_ptr<RodWork> stepper;
     std::unique_ptr<RodPart> part;
     RodInputs inputs;
     RodState state;
@@ -78,7 +78,7 @@ public:
   }
   void addRod(std::shared_ptr<const RodModel> model, const RodState& state)
   {
-    rods.push_back({std::make_unique<RodStepper::Impl>(model, timeOf(step_)), nullptr, {}, state});
+    rods.push_back({std::make_unique<RodWork>(model, timeOf(step_)), nullptr, {}, state});
     rods.back().part = std::make_unique<RodPart>(*rods.back().stepper, true);
     rods.back().part->setContact({});
   }

@@ -117,7 +117,7 @@ TEST_P(ClothPartInSteps, AreThoseOfAClothOnItsOwn)
   ClothPart part(cloth.model, o);
   PartDriver driver(part, coupled);
   const StepPlan plan = implicitEuler();
-  const double most = 2.0 * kTolerance * part.stages().shortestEdge();
+  const double most = 2.0 * kTolerance * part.work().shortestEdge();
   const double stiffness = 8.0 * (cloth.model->membrane.c11 + cloth.model->mass.maxCoeff() / (kPartStep * kPartStep));
   int iterations = 0, own_iterations = 0;
   for (int k = 0; k < 8; ++k)
@@ -150,7 +150,7 @@ TEST_P(ClothPartInSteps, AreThoseOfAClothOnItsOwn)
       own_iterations += own.iterations;
       EXPECT_LE((reached.x - cloth.state.x).colwise().norm().maxCoeff(), most) << k;
       EXPECT_LE((reached.v - cloth.state.v).colwise().norm().maxCoeff(), most / kPartStep) << k;
-      EXPECT_LE((part.stages().pin_forces - stepper.pinForces()).colwise().norm().maxCoeff(), stiffness * most) << k;
+      EXPECT_LE((part.work().pin_forces - stepper.pinForces()).colwise().norm().maxCoeff(), stiffness * most) << k;
       EXPECT_GT(report.max_strain, 0.0);
       EXPECT_NEAR(report.max_strain, own.max_strain, 1e-6 * own.max_strain);
     }
@@ -426,7 +426,7 @@ TEST(ClothPart, LimitsTurnsOfEdges)
   EXPECT_EQ(part.stepLimit(), 1.0);
   d[part.base(20) + 2] = 0.5;
   part.takeDirection(d.data());
-  const double edge = begun.part.stages().shortestEdge();
+  const double edge = begun.part.work().shortestEdge();
   EXPECT_DOUBLE_EQ(part.stepLimit(), 0.7 * edge / 0.5);
   EXPECT_DOUBLE_EQ(part.incrementSize(1.0), 0.5 / edge);
 }

@@ -58,7 +58,8 @@ std::vector<Named<RodKernels>> rodTables()
 TEST(InstructionSets, BestIsAmongThoseOfTheMachine)
 {
   const auto tables = bandTables();
-  EXPECT_EQ(toString(bestIsa()), tables.empty() ? std::string("baseline") : tables.back().name);
+  const Isa widest = tables.empty() ? Isa::baseline : tables.back().name == "avx512" ? Isa::avx512 : Isa::avx2;
+  EXPECT_EQ(bestIsa(), widest);
 }
 
 TEST(InstructionSets, BandKernelsAgree)

@@ -6,7 +6,7 @@
 
 #include "island/point_sweeps.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
-#include "slender_sim/linalg/symmetric_sweeps.h"
+#include "linalg/symmetric_sweeps.h"
 #include "test/support/cloths.h"
 
 namespace slender::test {

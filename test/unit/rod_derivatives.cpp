@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/geometry/framed_curve.h"
 #include "test/support/trial.h"
 
 namespace slender::test {

@@ -78,7 +78,6 @@ public:
 private:
   static constexpr int kFree = -1, kHeld = -2;
   using Vector6 = Eigen::Matrix<double, 6, 1>;
-  using Matrix6X = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
   struct Chain
   {

@@ -14,8 +14,6 @@ enum class IsometricElement
   conforming       ///< per inner vertex: cotangents, Voronoi cells lumped (2.4.1)
 };
 
-const char* toString(IsometricElement element);
-
 /// The row L-tilde of a hinge (thesis 2.4.4). For isometric motions of a flat mesh |sum_k weights[k] x_k| is the length
 /// of the edge times the angle between the faces, if that is small.
 struct HingeRow

@@ -12,7 +12,6 @@ enum class Isa
 /// Widest instruction set that both this machine and this build offer, and that SLENDER_ISA (baseline, avx2) in the
 /// environment does not forbid.
 Isa bestIsa();
-const char* toString(Isa isa);
 
 /// Picks among the tables of a kernel, one per instruction set.
 template <class Table>

@@ -23,8 +23,7 @@ public:
 
   /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by
   /// nested dissection of the graph of points (METIS), with the unknowns of a point next to each other and supernodes
-  /// wider than CHOLMOD's; factoring and solving take no memory. values(), starts(), rows() and index() are then not to
-  /// be used.
+  /// wider than CHOLMOD's; factoring and solving take no memory. values() is then not to be used.
   void setPattern(const BlockMatrix& matrix);
   void setPattern(const PointMatrix& matrix);
   /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are
@@ -43,10 +42,6 @@ public:
   int size() const;
   /// One per entry of the pattern.
   double* values();
-  const std::vector<int>& starts() const;
-  const std::vector<int>& rows() const;
-  /// Index of an entry of the lower triangle (row >= column) in values(). It must be in the pattern.
-  int index(int row, int column) const;
 
   /// False when the matrix is not positive definite (or not finite).
   bool factor();

@@ -38,6 +38,8 @@ struct RodEnergies
   double total() const { return stretch + bend + twist + kinetic + gravity; }
 };
 
+class RodWork;
+
 /// Advances one rod: implicit steps as an island of one part, whose matrix is a band, or explicit symplectic Euler
 /// (thesis 4.6).
 class RodStepper
@@ -69,12 +71,12 @@ public:
 
   const RodModel& model() const;
 
-  class Impl;
-  Impl& impl() { return *impl_; }
+  /// For islands of several parts.
+  RodWork& work() { return *work_; }
 
 private:
   class Alone;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<RodWork> work_;
   std::unique_ptr<Alone> alone_;   ///< what step() needs; null before its first call
 };
 

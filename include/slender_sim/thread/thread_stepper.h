@@ -26,6 +26,8 @@ struct EndLoad
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
 };
 
+class ThreadWork;
+
 /// Advances one viscous thread (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains those at
 /// the start of the step. implicit_euler for use; symplectic_euler, stable only for steps of about rho l^2 / (6 mu) at
 /// the shortest edge l, for comparison.
@@ -47,11 +49,9 @@ public:
 
   const ThreadModel& model() const;
 
-  class Impl;   ///< for the parts of islands
-
 private:
   class Alone;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<ThreadWork> work_;
   std::unique_ptr<Alone> alone_;
 };
 

@@ -76,7 +76,8 @@ double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
              : std::min(shell, 0.5 * pairs_.place(pair, elements_.reference).distance);
 }
 
-void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
+/// Appends a row of a pair that meets at this place. Its bound is set by the caller.
+CollisionRow& SurfaceCollider::Impl::addRow(const CollisionPair& pair, const PairPlace& place)
 {
   CollisionRow row{};
   row.normal = place.normal;
@@ -87,11 +88,17 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
     row.weight[i] = place.weight[i];
     row.anchor += place.weight[i] * from_.col(place.point[i]);
   }
+  row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
+  rows_.rows.push_back(row);
+  return rows_.rows.back();
+}
+
+void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
+{
+  CollisionRow& row = addRow(pair, place);
   row.push = push_ * std::max(0.0, range - pair.gap);
   row.bound = pairs_.core(pair) + std::min(pair.gap, range) + row.push;
   row.tolerance = 0.02 * std::min(pair.gap, range);
-  row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
-  rows_.rows.push_back(row);
   ++report_.repulsions;
 }
 
@@ -235,20 +242,9 @@ void SurfaceCollider::Impl::stop(const CollisionPair& pair)
 {
   const ApproachLimit limit = limitOf(pair);
   const double share = pairs_.limit(pair, from_, to_, limit), gap = std::min(pair.gap, limit.reach);
-  const PairPlace place = pairs_.place(pair, from_, to_, share);
-  CollisionRow row{};
-  row.normal = place.normal;
-  row.anchor.setZero();
-  for (int i = 0; i < 4; ++i)
-  {
-    row.point[i] = place.point[i];
-    row.weight[i] = place.weight[i];
-    row.anchor += place.weight[i] * from_.col(place.point[i]);
-  }
+  CollisionRow& row = addRow(pair, pairs_.place(pair, from_, to_, share));
   row.bound = limit.thickness + kTarget * gap;
   row.tolerance = 0.02 * gap;
-  row.friction = elements_.friction(pairs_.object(pair, false), pairs_.object(pair, true));
-  rows_.rows.push_back(row);
   ++report_.impulses;
 }
 

@@ -43,6 +43,7 @@ private:
   bool planeHit(int point, int plane) const;
   double planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const;
   double reach(const CollisionPair& pair) const;
+  CollisionRow& addRow(const CollisionPair& pair, const PairPlace& place);
   void repel(const CollisionPair& pair, const PairPlace& place, double range);
   void stop(const CollisionPair& pair);
   void addPlaneRow(int point, int plane, double gap, bool hit);

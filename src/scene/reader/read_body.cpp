@@ -202,13 +202,11 @@ std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& cont
   {
     bodies.push_back(readBody(entries[k], context, entries.size() == 1 ? "body" : "body" + std::to_string(k)));
     for (const YamlCursor& item : entries[k].find("welds").items())
-    {
       if (const auto weld = readWeld(item, rods))
       {
         checkWeld(item, *weld, rods, bodies);
         bodies.back().welds.push_back(*weld);
       }
-    }
   }
   return bodies;
 }

@@ -403,11 +403,8 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
 
 std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context)
 {
-  std::map<std::string, std::string> names;
-  return readEach<ClothConfig>(at, 1, 1000, "cloth", [&](const YamlCursor& entry, const std::string& default_name) {
-    ClothConfig cloth = readCloth(entry, context, default_name);
-    takeName(names, entry, cloth.name);
-    return cloth;
+  return readNamed<ClothConfig>(at, 1000, "cloth", [&](const YamlCursor& entry, const std::string& default_name) {
+    return readCloth(entry, context, default_name);
   });
 }
 

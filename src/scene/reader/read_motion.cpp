@@ -56,21 +56,35 @@ std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCurs
                                  " holds several bodies, of which it names one: " + joinWords(names));
 }
 
-constexpr const char* kTfMeaning =
-    "Name of a frame of tf that is followed, for example tool0; a node looks it up, and without a node nothing moves.";
-constexpr const char* kTfOffsetMeaning =
-    "With `tf`: pose in the frame of what is moved. Without the key: the frame's own pose.";
-constexpr const char* kFileMeaning =
-    "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, give `body` as well.";
-
 /// The keys that say how something moves.
 struct PoseKeys
 {
-  YamlCursor topic, tf, offset, body, table, file;
+  YamlCursor topic, body, tf, offset, table, file;
 
   /// Number of ways in which they say it.
   int given() const { return topic.present() + tf.present() + table.present() + (body.present() || file.present()); }
 };
+
+/// Reads the keys, of which some mean different things for different objects.
+PoseKeys readPoseKeys(const YamlCursor& at, const char* topic, const char* body, const char* table)
+{
+  YamlMap map(at);
+  PoseKeys keys{
+      map.get("topic", topic),
+      map.get("body", body),
+      map.get("tf",
+              "Name of a frame of tf that is followed, for example tool0; a node looks it up, and without a "
+              "node nothing moves."),
+      map.get("offset", "With `tf`: pose in the frame of what is moved. Without the key: the frame's own pose."),
+      map.get("table", table),
+      map.get("file",
+              "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, give `body` "
+              "as well.")};
+  map.finish();
+  if (keys.offset.present() && !keys.tf.present())
+    keys.offset.problem("is for motion: {tf: FRAME}");
+  return keys;
+}
 
 /// Returns nothing if a problem was reported.
 std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
@@ -131,19 +145,12 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
     return motion;
   }
   const std::size_t before = at.problems().size();
-  YamlMap map(at);
-  const YamlCursor topic = map.get("topic", "Must be true: the motion comes by messages. Same as the word topic.");
-  const YamlCursor body = map.get("body",
-                                  "Name of the body to follow: a driven body or an obstacle of the scene, or one that "
-                                  "only messages tell of. With `file`: name of the body in the file.");
-  const YamlCursor tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning);
-  const YamlCursor table = map.get("table",
-                                   "Timed poses: rows [t, x, y, z, qx, qy, qz, qw], with t in s, lengths in m and a "
-                                   "unit quaternion. Poses between rows are interpolated smoothly.");
-  const PoseKeys keys{topic, tf, offset, body, table, map.get("file", kFileMeaning)};
-  map.finish();
-  if (offset.present() && !tf.present())
-    offset.problem("is for motion: {tf: FRAME}");
+  const PoseKeys keys = readPoseKeys(
+      at, "Must be true: the motion comes by messages. Same as the word topic.",
+      "Name of the body to follow: a driven body or an obstacle of the scene, or one that only messages tell of. With "
+      "`file`: name of the body in the file.",
+      "Timed poses: rows [t, x, y, z, qx, qy, qz, qw], with t in s, lengths in m and a unit quaternion. Poses between "
+      "rows are interpolated smoothly.");
   if (keys.given() != 1 && at.problems().size() == before)
   {
     at.problem(
@@ -151,9 +158,9 @@ Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_o
   }
   if (keys.given() != 1)
     return motion;
-  if (!body.present() || keys.file.present())
+  if (!keys.body.present() || keys.file.present())
     return readKeys<Motion>(keys, context, needs_orientation);
-  if (const auto name = body.text())
+  if (const auto name = keys.body.text())
     motion = BodyMotion{*name};
   return motion;
 }
@@ -173,20 +180,15 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
     return at.choice(words).value_or(fixed);
   }
   const std::size_t before = at.problems().size();
-  YamlMap map(at);
-  const YamlCursor topic = map.get("topic",
-                                   "Must be true: the motion comes by messages on the topic `bodies`, or `nozzle/pose` "
-                                   "for a nozzle. Same as the word topic.");
-  const YamlCursor tf = map.get("tf", kTfMeaning), offset = map.get("offset", kTfOffsetMeaning),
-                   body = map.get("body", "Name of the body in `file`.");
-  const YamlCursor table = map.get("table",
-                                   "Timed poses: rows [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z], with t in s, "
-                                   "lengths in m and a unit quaternion. Poses between rows are interpolated smoothly.");
-  const PoseKeys keys{topic, tf, offset, body, table, map.get("file", kFileMeaning)};
-  map.finish();
-  if (offset.present() && !tf.present())
-    offset.problem("is for motion: {tf: FRAME}");
-  if (keys.given() == 1 && (keys.file.present() || !body.present()))
+  const PoseKeys keys = readPoseKeys(
+      at,
+      "Must be true: the motion comes by messages on the topic `bodies`, or `nozzle/pose` for a nozzle. Same as the "
+      "word topic.",
+      "Name of the body in `file`.",
+      "Timed poses: rows [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z], with t in s, lengths in m and a unit "
+      "quaternion. "
+      "Poses between rows are interpolated smoothly.");
+  if (keys.given() == 1 && (keys.file.present() || !keys.body.present()))
     return readKeys<GivenMotion>(keys, context, false);
   if (at.problems().size() == before)
   {

@@ -40,6 +40,8 @@ inline std::vector<YamlCursor> entriesOf(const YamlCursor& list)
 {
   return list.isList() ? list.items() : std::vector<YamlCursor>{};
 }
+/// Reports a name that another object has. `names` says what has each of them.
+void takeName(std::map<std::string, std::string>& names, const YamlCursor& entry, const std::string& name);
 /// Reads the entries of a list by read(entry, default name). The default name is `word`, with a number if there are
 /// several entries. Reports a list of fewer or more entries; none if there is no list.
 template <class Object, class Read>
@@ -52,8 +54,17 @@ std::vector<Object> readEach(const YamlCursor& list, std::size_t fewest, std::si
     objects.push_back(read(entry, entries.size() == 1 ? word : word + std::to_string(objects.size())));
   return objects;
 }
-/// Reports a name that another object has. `names` says what has each of them.
-void takeName(std::map<std::string, std::string>& names, const YamlCursor& entry, const std::string& name);
+/// The same for objects that may not have the names of others of them, or those in `names`.
+template <class Object, class Read>
+std::vector<Object> readNamed(const YamlCursor& list, std::size_t most, const std::string& word, const Read& read,
+                              std::map<std::string, std::string> names = {})
+{
+  return readEach<Object>(list, 1, most, word, [&](const YamlCursor& entry, const std::string& default_name) {
+    Object object = read(entry, default_name);
+    takeName(names, entry, object.name);
+    return object;
+  });
+}
 /// Throws std::runtime_error "`what` has coordinates beyond ... m `where`" if points are farther away than any may be.
 void requireCoordinates(const Eigen::Matrix3Xd& points, const std::string& what = "", const std::string& where = "");
 /// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end.

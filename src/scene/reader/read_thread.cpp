@@ -1,5 +1,3 @@
-#include <map>
-
 #include "generators.h"
 #include "read_parts.h"
 #include "slender_sim/geometry/rotation.h"
@@ -324,11 +322,8 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
 
 std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context)
 {
-  std::map<std::string, std::string> names;
-  return readEach<ThreadConfig>(at, 1, 10'000, "thread", [&](const YamlCursor& entry, const std::string& default_name) {
-    ThreadConfig thread = readThread(entry, context, default_name);
-    takeName(names, entry, thread.name);
-    return thread;
+  return readNamed<ThreadConfig>(at, 10'000, "thread", [&](const YamlCursor& entry, const std::string& default_name) {
+    return readThread(entry, context, default_name);
   });
 }
 

@@ -401,12 +401,12 @@ void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::ve
   std::map<std::string, std::string> names;   // to what has it
   for (const ClothConfig& cloth : cloths)
     names.emplace(cloth.name, "a cloth");
-  auto tracked =
-      readEach<ClothConfig>(at, 1, 1000, "tracked", [&](const YamlCursor& entry, const std::string& default_name) {
-        ClothConfig cloth = readTrackedCloth(entry, context, cloths, default_name);
-        takeName(names, entry, cloth.name);
-        return cloth;
-      });
+  auto tracked = readNamed<ClothConfig>(
+      at, 1000, "tracked",
+      [&](const YamlCursor& entry, const std::string& default_name) {
+        return readTrackedCloth(entry, context, cloths, default_name);
+      },
+      std::move(names));
   std::move(tracked.begin(), tracked.end(), std::back_inserter(cloths));
 }
 

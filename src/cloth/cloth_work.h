@@ -6,33 +6,27 @@
 #include "averaged_cloth_solver.h"
 #include "slender_sim/cloth/plastic_flow.h"
 #include "slender_sim/dynamics/integrator.h"
+#include "slender_sim/dynamics/substep_controller.h"
 
 namespace slender {
-
-/// Largest forces at the end of a substep [N].
-struct ClothBalance
-{
-  double unbalanced = 0;   ///< on vertices that are not held
-  double force = 0;        ///< of all kinds
-};
 
 inline constexpr char kDependentAverages[] =
     "prescribed averages depend on each other on the vertices that are not held: hold fewer vertices, or leave out the "
     "averages there";
 
-/// A step of one cloth, which an island advances, see ClothPart: in explicit substeps, or in implicit stages whose
-/// equations the island solves.
+/// The working copy of a cloth: its part in a step, which an island advances, see ClothPart: in explicit substeps, or
+/// in implicit stages whose equations the island solves.
 ///
-/// A step is begin(), substeps, end(). A substep is beginStep(); for each stage beginStage(), the solution of its
-/// equations in `x`, and endStage(), after the last one takeEnd() instead; then commitStep(), or the next attempt. An
-/// explicit substep is stepExplicitly() and commitStep().
-class ClothStages
+/// A step is begin(), substeps, end(). A substep is beginSubstep(); for each stage beginStage(), the solution of its
+/// equations in `x`, and endStage(), after the last one finish() instead; then accept(), or the next attempt. An
+/// explicit substep is stepExplicitly() and accept().
+class ClothWork
 {
 public:
-  /// Throws std::invalid_argument for a model or options that are not valid. with_averages: the stages keep prescribed
-  /// averages; otherwise their owner does.
-  ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o, bool with_averages = true);
-  virtual ~ClothStages() = default;
+  /// Throws std::invalid_argument for a model or options that are not valid. with_averages: the working copy keeps
+  /// prescribed averages; otherwise its owner does.
+  ClothWork(std::shared_ptr<const ClothModel> m, const ClothOptions& o, bool with_averages = true);
+  virtual ~ClothWork() = default;
 
   /// Steps spend this from now on, which others start; null: one of their own.
   void useBudget(std::shared_ptr<WorkBudget> budget);
@@ -48,8 +42,8 @@ public:
   /// Takes a step of `duration` [s] from a state. The inputs must live until the end().
   void begin(const ClothState& state, const ClothInputs& inputs, double duration);
   void end(ClothState& state) { std::swap(state, work_); }
-  /// Of a substep between these times, counted from the start of the step [s]. The plan must live until its end.
-  void beginStep(const StepPlan& plan, double from, double to);
+  /// Begins an implicit substep. The plan must live until its end.
+  void beginSubstep(const StepPlan& plan, const Substep& substep);
   /// Sets inertia, loads, viscous response and what is held.
   void beginStage(std::size_t stage);
   /// x := the motion carried on; what is held stands where it is at the end of the stage. Averages are met.
@@ -71,15 +65,14 @@ public:
   double closeGradient();
   /// Takes x as the end of a stage that is not the last.
   void endStage(std::size_t stage);
-  /// After takeEnd() of a linearised substep. Returns whether its end has more energy than the start and the work of
+  /// After finish() of a linearised substep. Returns whether its end has more energy than the start and the work of
   /// loads, pins and averages can give. `energy`: elastic and viscous energy at the end [J].
   bool createsEnergy(double energy) const;
   /// Takes x as the end of the substep. The gradient of the system must be that at x, with all that acts there.
   /// `internal`: the largest force that closeGradient() returned, or of contact [N].
-  ClothBalance takeEnd(double internal, double max_strain, StepReport& report);
-  void commitStep() { std::swap(work_, next_); }
-  /// An explicit substep between these times, counted from the start of the step [s].
-  StepFailure stepExplicitly(double from, double to, StepReport& report);
+  void finish(double internal, double max_strain, StepReport& report);
+  void accept() { std::swap(work_, next_); }
+  StepFailure stepExplicitly(const Substep& substep, StepReport& report);
   /// Longest stable explicit step of the cloth at rest [s]; infinite for implicit integrators.
   double stableStep() const;
   bool isExplicit() const { return slender::isExplicit(options.integrator); }
@@ -107,7 +100,7 @@ public:
   ClothOptions options;
   std::unique_ptr<ClothSystem> system;
   std::unique_ptr<ClothLinearSolver> linear;
-  AveragedClothSolver* averages = nullptr;   ///< the same, where the stages keep averages; else null
+  AveragedClothSolver* averages = nullptr;   ///< the same, where the working copy keeps averages; else null
   PointVector x;                             ///< present configuration: a guess, or the solution of a stage
   Eigen::Matrix3Xd pin_forces;               ///< of the cloth on its pins at the end of the substep [N]
   Eigen::Matrix3Xd average_forces;           ///< of prescribed averages at the end of the substep [N]
@@ -129,8 +122,8 @@ protected:
   const ClothInputs* inputs_ = nullptr;   ///< of the present step
   double duration_ = 0;                   ///< of the present step [s]
   ClothState work_, next_;                ///< start of a substep, and its end
-  const StepPlan* plan_ = nullptr;        ///< of the present substep, with its times [s]
-  double from_ = 0, to_ = 0;
+  const StepPlan* plan_ = nullptr;        ///< of the present substep
+  Substep substep_;
   std::vector<int> at_bound_;
   Eigen::Matrix3Xd averages_;   ///< that are prescribed at the end of the substep
   PointVector trial_, d_, pin_motion_, v_, force_, guess_, x_start_;

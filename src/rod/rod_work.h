@@ -14,11 +14,11 @@
 
 namespace slender {
 
-/// One rod's part in a step and its work space, which is reused from step to step.
-class RodStepper::Impl
+/// The working copy of a rod: its part in a step and its work space, which is reused from step to step.
+class RodWork
 {
 public:
-  Impl(std::shared_ptr<const RodModel> model, const TimeConfig& time);
+  RodWork(std::shared_ptr<const RodModel> model, const TimeConfig& time);
 
   StepReport solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles);
   StepReport assessEquilibrium(const RodState& state, const RodInputs& inputs);

@@ -1,4 +1,4 @@
-#include "cloth_stages.h"
+#include "cloth_work.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 namespace slender {
 
-ClothStages::ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions& o, bool with_averages)
+ClothWork::ClothWork(std::shared_ptr<const ClothModel> m, const ClothOptions& o, bool with_averages)
   : model(std::move(m)),
     options(o),
     plastic_(*model),
@@ -68,7 +68,7 @@ ClothStages::ClothStages(std::shared_ptr<const ClothModel> m, const ClothOptions
   useBudget(nullptr);
 }
 
-void ClothStages::buildSystem(const ClothModel& of)
+void ClothWork::buildSystem(const ClothModel& of)
 {
   const ClothSolver kind = solverOf(of, options);
   linear.reset();
@@ -85,7 +85,7 @@ void ClothStages::buildSystem(const ClothModel& of)
   useConstantMatrix();
 }
 
-void ClothStages::useBudget(std::shared_ptr<WorkBudget> budget)
+void ClothWork::useBudget(std::shared_ptr<WorkBudget> budget)
 {
   own_budget_ = budget == nullptr;
   budget_ = own_budget_ ? std::make_shared<WorkBudget>() : std::move(budget);
@@ -93,7 +93,7 @@ void ClothStages::useBudget(std::shared_ptr<WorkBudget> budget)
   linear->useBudget(*budget_);
 }
 
-void ClothStages::begin(const ClothState& state, const ClothInputs& inputs, double duration)
+void ClothWork::begin(const ClothState& state, const ClothInputs& inputs, double duration)
 {
   followClamps(state);
   work_ = state;
@@ -111,14 +111,14 @@ void ClothStages::begin(const ClothState& state, const ClothInputs& inputs, doub
   duration_ = duration;
 }
 
-void ClothStages::combine(const Combination& c, PointVector& result) const
+void ClothWork::combine(const Combination& c, PointVector& result) const
 {
   for (std::size_t i = 0; i < result.size(); ++i)
     result[i] = c[kQ] * x_start_[i] + c[kV] * v_start_[i] + c[kA] * a_start_[i] + c[kQStage] * x_stage_[i] +
                 c[kVStage] * v_stage_[i];
 }
 
-Eigen::Vector3d ClothStages::pinAt(std::size_t pin, double fraction) const
+Eigen::Vector3d ClothWork::pinAt(std::size_t pin, double fraction) const
 {
   const auto k = static_cast<Eigen::Index>(pin);
   const auto end = inputs_->pins.col(k);
@@ -126,17 +126,16 @@ Eigen::Vector3d ClothStages::pinAt(std::size_t pin, double fraction) const
                          : Eigen::Vector3d(pins_start_.col(k) + fraction * (end - pins_start_.col(k)));
 }
 
-void ClothStages::beginStep(const StepPlan& plan, double from, double to)
+void ClothWork::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
   plan_ = &plan;
-  from_ = from;
-  to_ = to;
+  substep_ = substep;
   toPoints(work_.x, x_start_);
   toPoints(work_.v, v_start_);
   system->hold(work_);
   at_bound_ = work_.at_bound;
   if (averages)
-    averages_ = averages_start_ + to / duration_ * (inputs_->averages - averages_start_);
+    averages_ = averages_start_ + substep.to / duration_ * (inputs_->averages - averages_start_);
   if (order(options.integrator) == 2)
   {
     const ClothEvaluation here = acceleration(plan.stages[0].tau_v);
@@ -145,11 +144,11 @@ void ClothStages::beginStep(const StepPlan& plan, double from, double to)
   }
 }
 
-void ClothStages::beginStage(std::size_t s)
+void ClothWork::beginStage(std::size_t s)
 {
   const Stage& stage = plan_->stages[s];
   const int n = model->vertices();
-  const double h = to_ - from_, reached = s == 0 ? 0.0 : plan_->stages[s - 1].time;
+  const double h = substep_.length, reached = s == 0 ? 0.0 : plan_->stages[s - 1].time;
   const bool second_order = order(options.integrator) == 2;
   const PointVector& start = s == 0 ? x_start_ : x_stage_;
   const PointVector& velocity = s == 0 ? v_start_ : v_stage_;
@@ -160,7 +159,8 @@ void ClothStages::beginStage(std::size_t s)
   std::fill(pin_motion_.begin(), pin_motion_.end(), 0.0);
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
     point(pin_motion_, work_.pins[k]) =
-        pinAt(k, (stage.time == 1.0 ? to_ : from_ + stage.time * h) / duration_) - point(start, work_.pins[k]);
+        pinAt(k, (stage.time == 1.0 ? substep_.to : substep_.from + stage.time * h) / duration_) -
+        point(start, work_.pins[k]);
   if (model->stiffness_damping > 0)
   {
     for (std::size_t i = 0; i < trial_.size(); ++i)
@@ -178,7 +178,7 @@ void ClothStages::beginStage(std::size_t s)
   linear->beginStage();
 }
 
-void ClothStages::placeGuess()
+void ClothWork::placeGuess()
 {
   for (int i = 0; i < model->vertices(); ++i)
     point(x, i) = system->held()[i] ? Eigen::Vector3d(point(system->start(), i) + point(pin_motion_, i))
@@ -186,25 +186,25 @@ void ClothStages::placeGuess()
   meetAverages();
 }
 
-void ClothStages::meetAverages()
+void ClothWork::meetAverages()
 {
   if (averages)
     averages->meetAverages(averages_, x);
 }
 
-void ClothStages::endStage(std::size_t s)
+void ClothWork::endStage(std::size_t s)
 {
   const Stage& stage = plan_->stages[s];
   for (int i = 0; i < model->vertices(); ++i)
   {
     const Eigen::Vector3d q = point(x, i);
-    point(v_stage_, i) = system->held()[i] ? Eigen::Vector3d((q - point(x_start_, i)) / (stage.time * (to_ - from_)))
+    point(v_stage_, i) = system->held()[i] ? Eigen::Vector3d((q - point(x_start_, i)) / (stage.time * substep_.length))
                                            : Eigen::Vector3d((q - point(q_tilde_, i)) / stage.tau_v);
   }
   x_stage_ = x;
 }
 
-double ClothStages::largestInternal() const
+double ClothWork::largestInternal() const
 {
   double largest = 0.0;
   for (int i = 0; i < model->vertices(); ++i)
@@ -212,15 +212,15 @@ double ClothStages::largestInternal() const
   return largest;
 }
 
-double ClothStages::resolvedForce() const
+double ClothWork::resolvedForce() const
 {
   return options.newton.tolerance * (model->membrane.c11 + model->membrane.c22) * shortest_edge_;
 }
 
-ClothBalance ClothStages::takeEnd(double internal, double max_strain, StepReport& report)
+void ClothWork::finish(double internal, double max_strain, StepReport& report)
 {
   const Stage& stage = plan_->stages.back();
-  const double h = to_ - from_;
+  const double h = substep_.length;
   next_ = work_;
   next_.at_bound = at_bound_;
   const bool second_order = order(options.integrator) == 2;
@@ -245,7 +245,7 @@ ClothBalance ClothStages::takeEnd(double internal, double max_strain, StepReport
   pin_forces.resize(3, static_cast<Eigen::Index>(work_.pins.size()));
   for (std::size_t k = 0; k < work_.pins.size(); ++k)
   {
-    next_.x.col(work_.pins[k]) = pinAt(k, to_ / duration_);
+    next_.x.col(work_.pins[k]) = pinAt(k, substep_.to / duration_);
     // a pin's speed changes at the start of the step: its inertia over the whole step counts, not that at the end,
     // which the last stage guesses from both
     const int p = work_.pins[k];
@@ -253,10 +253,9 @@ ClothBalance ClothStages::takeEnd(double internal, double max_strain, StepReport
         (point(x, p) - point(q_hat_, p)) / (stage.tau_a * stage.tau_a) - (next_.v.col(p) - work_.v.col(p)) / h;
     pin_forces.col(static_cast<Eigen::Index>(k)) = model->mass[p] * inertia - point(system->gradient(), p);
   }
-  return {unbalanced, force};
 }
 
-ClothEnergies ClothStages::energies(const ClothState& state, const Eigen::Vector3d& gravity)
+ClothEnergies ClothWork::energies(const ClothState& state, const Eigen::Vector3d& gravity)
 {
   ClothEnergies result;
   followClamps(state);
@@ -277,7 +276,7 @@ ClothEnergies ClothStages::energies(const ClothState& state, const Eigen::Vector
 }
 
 /// Elastic and viscous forces at (x, v_), wind, gravity and extra forces into force_. Mass damping is left out.
-ClothEvaluation ClothStages::addForces(bool with_constant)
+ClothEvaluation ClothWork::addForces(bool with_constant)
 {
   std::fill(d_.begin(), d_.end(), 0.0);
   const ClothEvaluation here = system->addInternal(x, d_, with_constant);
@@ -295,7 +294,7 @@ ClothEvaluation ClothStages::addForces(bool with_constant)
 
 /// a_start_ = F(x, v) / m at the start of a step; `delta`: a time over which strain rates are found to second order
 /// [s].
-ClothEvaluation ClothStages::acceleration(double delta)
+ClothEvaluation ClothWork::acceleration(double delta)
 {
   x = x_start_;
   v_ = v_start_;

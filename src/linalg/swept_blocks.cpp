@@ -1,0 +1,107 @@
+#include "swept_blocks.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace slender {
+
+void SweptBlocks::orderPoints()
+{
+  const int n = a_->points();
+  std::vector<int> level(n, 0);
+  const auto follow = [&](int j, int i) { level[i] = std::max(level[i], level[j] + 1); };
+  for (int j = 0; j < n; ++j)
+  {
+    for (int k = a_->starts()[j] + 1; k < a_->starts()[j + 1]; ++k)
+      follow(j, a_->rows()[k]);
+    for (int k = b_ ? b_->starts()[j] : 0; k < (b_ ? b_->starts()[j + 1] : 0); ++k)
+      if (b_->column(k) > j)
+        follow(j, b_->column(k));
+  }
+  order_.resize(n);
+  std::iota(order_.begin(), order_.end(), 0);
+  std::stable_sort(order_.begin(), order_.end(), [&](int i, int j) { return level[i] < level[j]; });
+}
+
+void SweptBlocks::setPattern(const BlockMatrix& a, const PointMatrix* b)
+{
+  a_ = &a;
+  b_ = b;
+  orderPoints();
+  const int n = points();
+  std::vector<int> visit(n);
+  for (int v = 0; v < n; ++v)
+    visit[order_[v]] = v;
+  starts_.assign(1, 0);
+  for (std::vector<int>* v : {&rows_, &a_entry_, &b_entry_})
+    v->clear();
+  b_diagonal_.assign(n, -1);
+  for (int v = 0; v < n; ++v)
+  {
+    const int j = order_[v];
+    int in_b = b ? b->starts()[j] : 0;
+    const int b_end = b ? b->starts()[j + 1] : 0;
+    const auto take = [&](int row, int a_entry, int b_entry) {
+      rows_.push_back(visit[row]);
+      a_entry_.push_back(a_entry);
+      b_entry_.push_back(b_entry);
+    };
+    for (; in_b < b_end && b->column(in_b) <= j; ++in_b)
+      if (b->column(in_b) == j)
+        b_diagonal_[v] = in_b;
+    for (int k = a.starts()[j] + 1; k < a.starts()[j + 1]; ++k)
+    {
+      for (; in_b < b_end && b->column(in_b) < a.rows()[k]; ++in_b)
+        take(b->column(in_b), -1, in_b);
+      const bool both = in_b < b_end && b->column(in_b) == a.rows()[k];
+      take(a.rows()[k], k, both ? in_b++ : -1);
+    }
+    for (; in_b < b_end; ++in_b)
+      take(b->column(in_b), -1, in_b);
+    starts_.push_back(static_cast<int>(rows_.size()));
+  }
+}
+
+void SweptBlocks::set(double factor, const std::vector<char>& held, const std::vector<char>* apart)
+{
+  factor_ = factor;
+  held_ = &held;
+  moves_.resize(order_.size());
+  for (int v = 0; v < points(); ++v)
+    moves_[v] = !isHeld(v) && !(apart && (*apart)[order_[v]]);
+}
+
+Eigen::Matrix3d SweptBlocks::block(int entry) const
+{
+  Eigen::Matrix3d block = Eigen::Matrix3d::Zero();
+  if (a_entry_[entry] >= 0)
+    block = Eigen::Map<const Eigen::Matrix3d>(a_->values() + 9 * static_cast<std::size_t>(a_entry_[entry]));
+  if (b_entry_[entry] >= 0)
+    block.diagonal().array() += factor_ * b_->values()[b_entry_[entry]];
+  return block;
+}
+
+Eigen::Matrix3d SweptBlocks::diagonal(int visit) const
+{
+  Eigen::Matrix3d block =
+      Eigen::Map<const Eigen::Matrix3d>(a_->values() + 9 * static_cast<std::size_t>(a_->starts()[order_[visit]]));
+  if (b_diagonal_[visit] >= 0)
+    block.diagonal().array() += factor_ * b_->values()[b_diagonal_[visit]];
+  return block;
+}
+
+void SweptBlocks::multiply(const PointVector& x, PointVector& product) const
+{
+  std::fill(product.begin(), product.end(), 0.0);
+  a_->addProduct(x.data(), product.data());
+  if (b_)
+    b_->addProduct(factor_, x.data(), product.data());
+}
+
+void SweptBlocks::toVisits(const PointVector& from, PointVector& to) const
+{
+  for (int v = 0; v < points(); ++v)
+    point(to, v) = point(from, order_[v]);
+}
+
+}   // namespace slender
