@@ -292,7 +292,7 @@ const std::vector<HandMeasured>& handMeasured()
        "CPU time over that of STARK 0.1.0, one thread: hanging sheets of 20, 40, 80 and 160 cells a side; sheets that "
        "a "
        "ball falls into, 20, 40, 80; sheets that fall onto a sphere, 20, 40, 80; boxes on a sheet; a twisted sheet",
-       "0.15, 0.18, 0.24, 0.63; 0.27, 0.37, 0.46; 0.33, 0.38, 1.3; 0.33; 0.87", "at most 0.2",
+       "0.17, 0.17, 0.22, 0.63; 0.26, 0.32, 0.27; 0.26, 0.27, 1.3; 0.33; 0.57", "at most 0.2",
        "Coarse cloth in contact is solved several times as fast as by the nearest peer, and fine cloth not yet.",
        "0.2.0"},
       {"sweep config/sweeps/sewing_map.yaml", "patterns over height of fall and belt speed: disorder", "from 7 to 8 cm",
