@@ -80,7 +80,7 @@ bool Candidates::mayMeet(const ContactSurface& surface, const ContactSegment& a,
   const double share = c.self ? contactShare(a, b, c, gap) : 0.0;
   if (share == 0.0 || share == 1.0)
     return share == 1.0;
-  // Balls around near segments of one curve: their boxes overlap although the curve is straight.
+  // Boxes of near segments overlap even if the curve is straight. Balls around the segments tell more.
   double reach = share * (a.coreRadius() + b.coreRadius() + gap);
   const auto middle = [&](const ContactSegment& s) -> Eigen::Vector3d {
     const Eigen::Vector3d from = 0.5 * (low_.col(s.a) + high_.col(s.a)), to = 0.5 * (low_.col(s.b) + high_.col(s.b));

@@ -33,18 +33,6 @@ Kdop Kdop::swept(const double* from, const double* to, double radius)
   return out;
 }
 
-Kdop Kdop::none()
-{
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  Kdop out;
-  for (int k = 0; k < 2; ++k)
-  {
-    out.low[k] = Slabs{} + kInfinity;
-    out.high[k] = Slabs{} - kInfinity;
-  }
-  return out;
-}
-
 void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& groups, const std::vector<char>& touching,
                      std::size_t count)
 {

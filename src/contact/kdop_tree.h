@@ -16,7 +16,6 @@ struct Kdop
 
   /// Of a ball that moves along a line [m].
   static Kdop swept(const double* from, const double* to, double radius);
-  static Kdop none();
   void include(const Kdop& b)
   {
     for (int k = 0; k < 2; ++k)

@@ -94,7 +94,7 @@ void SharedMatrix::noteBases(const Bases& bases)
         blocks_below_[std::min(bases[i], bases[j])].push_back(std::max(bases[i], bases[j]));
 }
 
-/// Contacts that share points have noted most blocks several times.
+/// Notes the entries of the blocks, each block once. Contacts that share points have noted most blocks several times.
 void SharedMatrix::noteBlocks()
 {
   for (int u = 0; u < unknowns_; ++u)

@@ -125,8 +125,9 @@ void SymmetricSweeps::deflate(Search<Scalar>& s)
 
 /// Iterates from what load() has left, until the norm is `tolerance` times `scale`. In the norm of D, the matrix is
 /// (D + L)^-1 A (D + L^T)^-1, and its product with p is t + (D + L)^-1 (p - D t) with t = (D + L^T)^-1 p, where
-/// p - D t = L^T t. What the common motions of `groups` would need is taken from this L^T t. `between` sets them, or
-/// adds to L^T t what a larger matrix has beside A. `advanced` follows each step along t.
+/// p - D t = L^T t. The downward sweep subtracts from this L^T t the forces B c of the common motions c of `groups`.
+/// `between` is called before it: it sets c, or it adds the product of t with what a larger matrix has beside A.
+/// `advanced` is called after each step along t.
 template <class Scalar, class Between, class Advanced>
 SymmetricSweeps::SearchEnd SymmetricSweeps::iterate(Search<Scalar>& s, const GroupBlocks<Scalar>& groups, double square,
                                                     double scale, double tolerance, int max_iterations,

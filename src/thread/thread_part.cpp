@@ -14,7 +14,7 @@ void ThreadPart::noteEnds()
                             : system_.position(nodeOf(i));
 }
 
-/// Nodes that met the floor are held there: they go there from the base.
+/// Holds the nodes that met the floor. Their prescribed motion leads from the base to the place where they met it.
 void ThreadPart::holdMore()
 {
   if (!thread_.stopLanding())

@@ -60,7 +60,8 @@ public:
 
   /// When the first node goes through the floor, as a fraction of the substep; above 1: none does.
   double firstLanding() const;
-  /// Stops those that do about then where they meet the floor, and holds them. Returns false if none does.
+  /// Stops the nodes that meet the floor at about that time, and holds them at the place where they meet it. Returns
+  /// false if none does.
   bool stopLanding();
 
   bool endHeld(int node) const

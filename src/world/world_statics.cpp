@@ -70,7 +70,7 @@ WorldStatics::WorldStatics(WorldObjects& objects)
 
 // ---- states of its parts
 
-/// Copies what the search is about.
+/// Copies the part of a state that the search for an equilibrium uses.
 void WorldStatics::copy(const WorldState& from, WorldState& to) const
 {
   to.rods.resize(from.rods.size());

@@ -35,10 +35,10 @@ ClothOptions oneStep(Integrator integrator, int cuts)
   return o;
 }
 
-/// The energy never exceeds that at the start by a hundredth of what a fall through the sheet's size gives, where it
-/// was up to 1e7 times that: steps are cut, or refused. With tr_bdf2, which damps less, it is a tenth, and for 1e8 N/m
-/// twice that fall: the wrinkles of so stiff a sheet depend on rounding errors, and gains were 0.1 to 1.6 times the
-/// fall with linear equations solved to 5e-3 to 5e-7.
+/// The energy never exceeds its value at the start by more than a hundredth of what a fall through the sheet's size
+/// gives; steps are cut or refused instead. Without this check gains were up to 1e7 times that. The integrator tr_bdf2
+/// damps less: it is allowed a tenth of the fall, and twice the fall at 1e8 N/m. The wrinkles of so stiff a sheet
+/// depend on rounding errors: gains were 0.1 to 1.6 times the fall when linear equations were solved to 5e-3 to 5e-7.
 TEST(ClothCreatedEnergy, NoneAppears)
 {
   int done = 0;

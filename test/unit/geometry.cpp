@@ -145,7 +145,7 @@ TEST(FramedCurve, ALoopKeepsItsHolonomyAtNodeZero)
   // A frame carried along a closed path of tangents comes back turned by the area that the path encloses on the unit
   // sphere (thesis 3.5). The tangents x, y, z of this loop enclose an eighth of the sphere, pi / 2. With its last
   // tangent, the opposite of their mean, z and x enclose a third of the rest, 7 pi / 6. Together: 5 pi / 3, a turn
-  // less pi / 3. The first frame is thus ahead of the one that was carried by pi / 3.
+  // less pi / 3. By pi / 3 the first frame is thus ahead of the carried frame.
   Matrix3Xd x(3, 4);
   x.col(0) = Vector3d(0, 0, 0);
   x.col(1) = Vector3d(1, 0, 0);

@@ -54,7 +54,8 @@ struct IgnoredSolid
 };
 
 /// A curve or a cloth of a contact surface. Pieces of one object that share a point are never a contact pair. Near
-/// pieces of one object keep a share of thickness and gap only: of a curve see contactShare(), of a cloth `rest`.
+/// pieces of one object keep only a share of thickness and gap: contactShare() gives that of a curve, and `rest`
+/// determines that of a cloth.
 struct ContactObject : ContactProperties
 {
   double curve_length = 0.0;   ///< [m]
@@ -112,10 +113,10 @@ struct BarrierRange
 };
 
 /// Share of thickness and gap that two segments of one curve keep from each other, by their distance along the curve
-/// and the sum of their radii. It is 1 from half a turn of the tightest bend on that does not touch itself, which is
-/// (pi/2) (r1 + r2 + gap). Below, it is proportional to the distance along the curve: thickness plus gap is 2/pi of
-/// that distance. A bend that is no tighter thus touches nothing, a bend that is stretched keeps the room that it has,
-/// and no pair begins to count all at once.
+/// and the sum of their radii [m]. It is 1 if that distance is at least (pi/2) (r1 + r2 + gap), half a turn of the
+/// tightest bend that does not touch itself. If the distance is smaller, the share is proportional to it: thickness
+/// plus gap is 2/pi of the distance. A bend that is not tighter than this touches nothing, and a bend that is stretched
+/// keeps its room.
 double contactShare(double along, double radii, double gap);
 /// The same of two segments, by their distance along the curve at rest, the shorter way around a closed one. 0: they
 /// have a point in common, or nearly so, and never count as a pair.

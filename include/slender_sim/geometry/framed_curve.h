@@ -29,7 +29,7 @@ public:
   /// Angles theta^j from reference to material frame, per edge [rad].
   Eigen::VectorXd theta;
 
-  /// A joint between two edges, which the end nodes of an open curve are not.
+  /// Returns true if node i joins two edges. The end nodes of an open curve do not.
   bool hasJoint(int i) const { return closed_ || (i > 0 && i + 1 < nodes()); }
 
   /// Material twist m_i = theta^i - theta^{i-1} [rad]. At node 0 of a closed curve the angle is added by which the

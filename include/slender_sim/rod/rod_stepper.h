@@ -71,7 +71,7 @@ public:
 
   const RodModel& model() const;
 
-  /// For islands of several parts.
+  /// Islands of several parts use the working copy.
   RodWork& work() { return *work_; }
 
 private:

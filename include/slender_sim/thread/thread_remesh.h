@@ -54,7 +54,7 @@ void removeEnd(ThreadState& state, int end);
 void spreadFluid(ThreadState& state, int j);
 
 /// Takes out the fold at an inner node. A node there, or a free end beside it, is removed, because the fluid on both
-/// sides has flowed together. If several removals take out the fold, that which leaves the thinnest edge is chosen.
+/// sides has flowed together. If several removals take out the fold, the one that leaves the thinnest edge is chosen.
 /// Where a free edge folds back on one that lies on the floor, the node is held there as it is. Returns false if
 /// nothing can be done, or if the guard (may be null) forbids it.
 bool mendFold(ThreadState& state, int node, const RemeshGuard* guard = nullptr);

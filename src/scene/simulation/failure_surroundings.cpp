@@ -197,8 +197,9 @@ private:
     return std::max(model.radius_a[edge], model.radius_b[edge]);
   }
 
-  /// Whether an edge of the same rod lies there because the rod comes back: it keeps its whole thickness there (see
-  /// contactShare()), and the way along the rod is at least twice as long as the distance.
+  /// Returns true if an edge of the same rod is near because the rod returns to this place, and not because the edge is
+  /// a neighbour: it keeps its whole thickness (see contactShare()), and the distance along the rod is at least twice
+  /// the distance in space.
   bool comesBack(const RodModel& model, int edge, double radii, double distance) const
   {
     const auto between = [&model](int from, int to) {

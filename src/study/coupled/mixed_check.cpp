@@ -244,8 +244,8 @@ void MixedCheck::checkTubes(MixedFindings& out) const
     for (std::size_t j = i + 1; j < tubes_.size(); ++j)
     {
       const Tube &s = tubes_[i], &t = tubes_[j];
-      // What is near along one curve keeps the share of its thickness that contact promises, down to none where the
-      // pieces meet. From half a turn of the tightest bend on it keeps all.
+      // Two pieces of one curve keep the share of their thickness that contact promises for their distance along the
+      // curve. Pieces that have a point in common keep none, and pieces that are far apart along it keep all.
       const double share = s.object == t.object
                                ? contactShare({0, 0, s.whole, 0, s.start, s.length},
                                               {0, 0, t.whole, 0, t.start, t.length}, curves_[s.object], gap_)

@@ -282,7 +282,7 @@ struct Line
   double at(double x) const { return constant + slope * x; }
 };
 
-// vertices; below, what does not depend on the size shows
+// Fits begin at this number of vertices. In smaller scenes, costs that do not depend on the size are visible.
 constexpr double kFitFrom = 3500;
 constexpr double kLarge = 1e6;
 
