@@ -369,7 +369,7 @@ void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose
 }
 
 double ContactPotential::lagFriction() { return impl_->lagFriction(); }
-void ContactPotential::followFriction(bool on) { impl_->following = on; }
+void ContactPotential::followFriction(const std::vector<Eigen::Vector3d>& moves) { impl_->follow(moves); }
 const std::vector<FrictionSpring>& ContactPotential::springs() const { return impl_->springs; }
 void ContactPotential::setSprings(const std::vector<FrictionSpring>& springs) { impl_->springs = springs; }
 void ContactPotential::keepSprings(const std::vector<Pose>& solids) { impl_->keepSprings(solids); }

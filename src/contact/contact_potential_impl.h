@@ -58,7 +58,8 @@ public:
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns);
   void beginFollowing();
-  double lagFriction(double least = 0.0);
+  void follow(const std::vector<Eigen::Vector3d>& moves);
+  double lagFriction(double least = 0.0, bool predicted = false);
   void keepSprings(const std::vector<Pose>& poses);
   void letPass(const SurfaceMotion& motion);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
@@ -188,8 +189,9 @@ private:
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
-  int follows_left_ = 0;   ///< how often friction may still follow before the next begin()
-  double shift_ = 0.0;     ///< constant of the potential, see followFriction() [J]
+  std::vector<Contact> predicted_;   ///< contacts of the last evaluation, with forces as follow() predicts them
+  int follows_left_ = 0;             ///< how often friction may still follow before the next begin()
+  double shift_ = 0.0;               ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;

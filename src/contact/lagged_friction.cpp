@@ -146,13 +146,28 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
 
 void ContactPotential::Impl::beginFollowing()
 {
-  constexpr int kMostFollows = 5;   // Contacts that alternately stick and slip would follow without end.
+  constexpr int kMostFollows = 20;   // Contacts that alternately stick and slip would follow without end.
   following = false;
   follows_left_ = kMostFollows;
 }
 
+void ContactPotential::Impl::follow(const std::vector<Eigen::Vector3d>& moves)
+{
+  constexpr double kFar = 10.0;   // smallest gaps: the change of a force is not linear over such distances
+  following =
+      std::all_of(moves.begin(), moves.end(), [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap; });
+  predicted_ = contacts;
+  for (std::size_t k = 0; k < predicted_.size(); ++k)   // The normal terms come first, in the order of the contacts.
+  {
+    Eigen::Vector3d& force = predicted_[k].force;
+    const double size = force.norm();
+    if (size > 0.0)
+      force *= std::max(0.0, 1.0 - force.dot(terms[k].stiffness * moves[k]) / (size * size));
+  }
+}
+
 /// Adds the friction of all contacts. Its normal forces are those of an earlier configuration or, if friction follows,
-/// those of this one.
+/// predicted ones.
 double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
                                            const Eigen::VectorXd* turns, bool with_stiffness)
 {
@@ -167,26 +182,37 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   const std::size_t others = terms.size();
   const double before = sum(false) + shift_;
   terms.resize(others);
-  if (lagFriction(kLagTolerance) > kLagTolerance)
+  if (lagFriction(kLagTolerance, true) > kLagTolerance)
     --follows_left_;
   shift_ = before - sum(true);
   return before;
 }
 
-/// Does not take the new forces over if they have changed by less than `least`.
-double ContactPotential::Impl::lagFriction(double least)
+/// Does not take the new forces over if they have changed by less than `least`. `predicted`: instead of present normal
+/// forces it takes the predicted ones of the same contacts.
+double ContactPotential::Impl::lagFriction(double least, bool predicted)
 {
   const auto comes_before = [](const Contact& a, const Contact& b) {
     return a.first != b.first ? a.first < b.first : a.second < b.second;
   };
   double change = 0.0, largest = 0.0;
-  auto old = lagged.begin();
+  auto old = lagged.begin(), before = predicted_.begin();
   rubbing_.clear();
-  for (Contact& contact : contacts)
+  for (const Contact& present : contacts)
   {
-    contact.friction = frictionOf(contact);
-    if (!(contact.friction > 0.0))
+    const double friction = frictionOf(present);
+    if (!(friction > 0.0))
       continue;
+    if (predicted)
+    {
+      before = std::find_if(before, predicted_.end(), [&](const Contact& c) { return !comes_before(c, present); });
+      if (before == predicted_.end() || comes_before(present, *before))
+        continue;
+    }
+    Contact& contact = rubbing_.emplace_back(present);
+    contact.friction = friction;
+    if (predicted)
+      contact.force = before->force.norm() * present.force.normalized();
     for (; old != lagged.end() && comes_before(*old, contact); ++old)
       change = std::max(change, old->force.norm());
     const bool same = old != lagged.end() && !comes_before(contact, *old);
@@ -209,7 +235,6 @@ double ContactPotential::Impl::lagFriction(double least)
       if (spring != springs.end() && !(wanted < *spring))
         contact.tension = contact.tension_begin = spring->tension;
     }
-    rubbing_.push_back(contact);
   }
   for (; old != lagged.end(); ++old)
     change = std::max(change, old->force.norm());

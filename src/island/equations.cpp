@@ -273,10 +273,10 @@ double Equations::incrementSize() const
   return std::max(largest, tolerance_ * moved_sticking_ / kStick);
 }
 
-/// Measures how far the direction moves touching surfaces relative to each other. If that is little, friction follows.
+/// Measures how far the direction moves touching surfaces relative to each other. Unless that is far, friction follows.
 void Equations::measureContacts()
 {
-  constexpr double kLittle = 0.1;   // of the smallest gap
+  moves_.clear();
   double at_contact = 0.0, sticking = 0.0;
   for (const ContactTerm& term : contact_->terms())
   {
@@ -289,13 +289,14 @@ void Equations::measureContacts()
     if (const RigidPart* body = bodyOf(term.solid))
       u -= body->moveAt(term.position);
     forTurns(term, [&](Part& part, int point, const Eigen::Vector3d& column) { u += part.moveTurn(point) * column; });
+    moves_.push_back(u);
     at_contact = std::max(at_contact, u.norm());
     if (term.slip_range > 0.0)
       sticking = std::max(sticking, u.norm() / term.slip_range);
   }
   moved_at_contact_ = at_contact;
   moved_sticking_ = sticking;
-  contact_->followFriction(at_contact < kLittle * contact_->smallestGap());
+  contact_->followFriction(moves_);
 }
 
 double Equations::slope() const

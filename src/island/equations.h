@@ -102,7 +102,7 @@ public:
 private:
   // the system of a stage, as these two need it
   template <class System>
-  friend bool isLastIncrement(System&, const NewtonConfig&, const HessianShift&, double);
+  friend bool isLastIncrement(System&, const NewtonConfig&, const HessianShift&, double, double);
   template <class System>
   friend NewtonResult minimize(System&, const NewtonConfig&);
   template <class System>
@@ -202,6 +202,7 @@ private:
   /// Largest relative motion of touching surfaces by the direction: of all contacts [m], and of contacts that stick, as
   /// a fraction of the stretch at which they slip [-].
   double moved_at_contact_ = 0, moved_sticking_ = 0;
+  std::vector<Eigen::Vector3d> moves_;   ///< of contacts by the direction [m]
 };
 
 }   // namespace slender

@@ -315,9 +315,9 @@ private:
   }
 };
 
-/// If friction follows, its normal forces are those of the present configuration. The forces are the gradient of the
-/// potential, and the potential does not jump.
-TEST(ContactFriction, FollowsNormalForces)
+/// If friction follows, its normal forces are those that the last evaluation predicts. The forces are the gradient of
+/// the potential, and the potential does not jump.
+TEST(ContactFriction, FollowsPredictedForces)
 {
   SegmentOnFloor on_floor;
   Eigen::Matrix3Xd& x = on_floor.x;
@@ -328,25 +328,39 @@ TEST(ContactFriction, FollowsNormalForces)
   potential.begin(x, solids, kStep);
   const double full = gapOptions().slip_speed * kStep;
   const auto at = [&](double deep) { return Eigen::Matrix3Xd(x.colwise() + (20 * full * side + deep * down)); };
-  const auto friction = [&] { return potential.terms().back().force.norm() / potential.terms()[0].force.norm(); };
+  const auto friction = [&] { return potential.terms().back().force.norm(); };
+  // Evaluates at a depth, and predicts the force after a motion from there.
+  const auto predict = [&](double deep, double motion) {
+    potential.evaluate(at(deep), solids, true);
+    const ContactTerm normal = potential.terms()[0];
+    potential.followFriction(std::vector<Eigen::Vector3d>(potential.terms().size(), motion * down));
+    return std::max(0.0, (normal.force - normal.stiffness * motion * down).z());
+  };
 
-  const double before = potential.evaluate(at(0.002), solids, true);
-  EXPECT_LT(friction(), 0.9 * kFriction);   // of a smaller normal force
-  potential.followFriction(true);
+  const double predicted = predict(0.0, 0.002), first = friction();
+  const double before = potential.evaluate(at(0.002), solids, false);
+  EXPECT_NEAR(friction(), first, 1e-9 * first);   // without the stiffness nothing changes
   potential.evaluate(at(0.002), solids, true);
-  EXPECT_NEAR(friction(), kFriction, 1e-9 * kFriction);
+  EXPECT_GT(kFriction * predicted, 1.1 * first);
+  EXPECT_NEAR(friction(), kFriction * predicted, 1e-9 * kFriction * predicted);
   EXPECT_NEAR(potential.evaluate(at(0.002), solids, false), before, 1e-14 * std::abs(before));   // round-off
-  const double force = potential.terms().back().force.norm(), h = 1e-3 * full;
+  const double force = friction(), h = 1e-3 * full;
   const Eigen::Matrix3Xd there = at(0.002).colwise() + h * side, back = at(0.002).colwise() - h * side;
   EXPECT_NEAR(potential.evaluate(there, solids, false) - potential.evaluate(back, solids, false), 2 * h * force,
               1e-6 * 2 * h * force);
-  // Friction follows five times, so that a minimisation ends.
+  predict(0.002, 11 * potential.smallestGap());   // too far
+  potential.evaluate(at(0.002), solids, true);
+  EXPECT_NEAR(friction(), force, 1e-9 * force);
+  // Friction follows twenty times, so that a minimisation ends.
   int follows = 1;
-  for (; follows < 20; ++follows)
-    if (potential.evaluate(at(follows % 2 == 0 ? 0.002 : 0.0), solids, true);
-        std::abs(friction() - kFriction) > 1e-3 * kFriction)
+  for (; follows < 40; ++follows)
+  {
+    const double wanted = predict(0.001, follows % 2 == 0 ? 0.001 : -0.001);
+    potential.evaluate(at(0.001), solids, true);
+    if (std::abs(friction() - kFriction * wanted) > 1e-3 * kFriction * wanted)
       break;
-  EXPECT_EQ(follows, 5);
+  }
+  EXPECT_EQ(follows, 20);
   potential.beginSolution();   // lagFriction() still takes new forces over
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
@@ -359,7 +373,7 @@ TEST(ContactFriction, SpringsLastFromStepToStep)
   Eigen::Matrix3Xd& x = on_floor.x;
   const std::vector<Pose>& solids = on_floor.solids;
   ContactPotential& potential = on_floor.potential;
-  constexpr double kStep = SegmentOnFloor::kStep, kFriction = SegmentOnFloor::kFriction;
+  constexpr double kStep = SegmentOnFloor::kStep;
   const double full = gapOptions().slip_speed * kStep;
   const Eigen::Vector3d side(0.6, 0.8, 0);
   const auto forceAfter = [&](double slip) -> Eigen::Vector3d {

@@ -69,7 +69,7 @@ void expectHalvesLikeFresh(const std::string& what, const State& start, double l
 {
   constexpr int kMost = 24;   // iterations
   int found = 0;
-  for (int k = 0; k < 4 * kMost && found < 2; ++k)
+  for (int k = 0; k < 8 * kMost && found < 2; ++k)
   {
     const double h = std::ldexp(longest, -(k / kMost));
     NewtonConfig newton;

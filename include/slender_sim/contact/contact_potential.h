@@ -246,10 +246,14 @@ public:
   double lagFriction();
   /// A change that lagFriction() returns is negligible if it is at most this [-].
   static constexpr double kLagTolerance = 1e-2;
-  /// If this is on, each evaluate() with stiffness first does what lagFriction() does, unless the change is negligible.
-  /// A constant is then added to the potential, so that the potential does not jump. Friction follows at most a few
-  /// times after begin(), because a minimisation might not end otherwise. beginSolution() switches it off.
-  void followFriction(bool on);
+  /// Tells how far the direction of an iteration moves the u of each term of terms() [m], after an evaluate() with
+  /// stiffness. The next evaluate() with stiffness first gives friction the normal forces that the terms predict, to
+  /// first order, for the end of the iteration. They are closer to the solution than those of the iterates, in which
+  /// gaps are too small or too large. Friction does not change if the change is negligible, or if a contact moves by
+  /// more than ten times the smallest gap. A constant is added to the potential, so that the potential does not jump.
+  /// Friction follows a limited number of times after begin(), because a minimisation might not end otherwise.
+  /// beginSolution() forgets the directions before.
+  void followFriction(const std::vector<Eigen::Vector3d>& moves);
   /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
   /// threads have none, because their pieces change.
   const std::vector<FrictionSpring>& springs() const;

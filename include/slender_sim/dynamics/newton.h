@@ -25,11 +25,19 @@ struct NewtonResult
 /// curvature 2 tan(phi/2) has grown to 40 and parallel transport is about to become undefined.
 constexpr double kFoldedChi = 1.5e-3;
 
-/// Returns whether a full step of this increment ends Newton's method. A shifted Hessian shortens the increment, so a
-/// saddle (a step's equation may well have one) must show by its residual.
+/// Returns whether a full step of this increment ends Newton's method. So it does if the increment after it would be
+/// within the tolerance, by the rate at which increments shrink [Hairer and Wanner, Solving Ordinary Differential
+/// Equations II, IV.8]. `before` is the increment before, or 0 if that was not a full step. A shifted Hessian shortens
+/// the increment, so a saddle (a step's equation may well have one) must show by its residual.
 template <class System>
-bool isLastIncrement(System& system, const NewtonConfig& config, const HessianShift& shift, double increment)
+bool isLastIncrement(System& system, const NewtonConfig& config, const HessianShift& shift, double increment,
+                     double before)
 {
+  constexpr double kSlowest = 0.3;   // rate from which on two increments tell nothing of the next one
+  constexpr double kSafety = 0.3;
+  if (shift.none() && increment < kSlowest * before &&
+      increment * increment <= kSafety * (before - increment) * config.tolerance)
+    return true;
   if (increment <= config.tolerance && shift.none())
     return true;
   if (increment >= 1e-2)
@@ -68,7 +76,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
   if (!std::isfinite(trial.energy()) || !std::isfinite(trial.min_chi))
     return fail(StepFailure::state_not_finite);
   system.accept();
-  double energy = trial.energy(), best = energy;
+  double energy = trial.energy(), best = energy, before = 0.0;
   int misses = 0;
   bool strict = false;
 
@@ -106,7 +114,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (!std::isfinite(increment))
       return fail(StepFailure::state_not_finite);
     double alpha = system.stepLimit();
-    if (alpha == 1.0 && isLastIncrement(system, config, shift, increment))
+    if (alpha == 1.0 && isLastIncrement(system, config, shift, increment, before))
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
@@ -121,6 +129,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     if (result.iterations >= config.max_iterations)
       return fail(StepFailure::newton_diverged);
 
+    before = alpha == 1.0 && shift.none() ? increment : 0.0;
     shift.relax();
     for (;;)
     {
