@@ -318,7 +318,7 @@ void ClothPart::factor(const HessianShift& shift)
 {
   const double added = inertiaShift(shift);
   if (statics_rate_ > 0.0)
-    system().addInertia((shift.position + kFirstShift * shift.angle) * statics_rate_);
+    system().addInertia((shift.position + kFirstShift * shift.angle) * statics_rate_ + pencil_rate_);
   else if (added > 0.0)
     system().shiftMatrix(added);
   if (solvesByFactors())
@@ -378,13 +378,7 @@ double ClothPart::stepLimit() const
 {
   if (!contact_ && !(statics_rate_ > 0.0))   // with inertia the energy alone bears turns of any size
     return 1.0;
-  const auto& edges = work_.model->topology.edges;
-  double turn = 0.0;
-  for (std::size_t e = 0; e < inverse_length_.size(); ++e)
-  {
-    const auto edge = edges.col(static_cast<Eigen::Index>(e));
-    turn = std::max(turn, (vertex(direction_, edge[1]) - vertex(direction_, edge[0])).norm() * inverse_length_[e]);
-  }
+  const double turn = turnOfEdges();
   return turn > kMostTurn ? kMostTurn / turn : 1.0;
 }
 
@@ -417,6 +411,8 @@ double ClothPart::residual() const
 /// what Newton's tolerance leaves.
 double ClothPart::forceScale() const
 {
+  if (statics_rate_ > 0.0)
+    return staticForceScale();
   const ClothModel& m = *work_.model;
   // alone: with IslandTolerances::most_unbalanced a tenth of this may be unbalanced
   const double resolved = own_ ? work_.resolvedForce() : 10.0 * work_.resolvedForce();

@@ -45,8 +45,9 @@ public:
   void setContact(const ContactProperties& contact, double step, const std::vector<IgnoredSolid>& ignored = {});
   /// These vertices are driven corners of the surface from now on. begin() takes them from the state.
   void setPins(const std::vector<int>& pins);
-  /// For statics. The Hessian is always the exact one, and a shift adds so much inertia [1/s^2] per unit.
-  void minimiseWithoutInertia(double rate) { statics_rate_ = rate; }
+  /// From now on the part is for statics: its Hessian is always the exact one. begin() comes before. Returns false if
+  /// nothing can balance the loads.
+  bool beginStatics();
   int points() const override { return work_.model->vertices(); }
   void addSurface(ContactSurface& surface) const override;
 
@@ -113,6 +114,26 @@ private:
   double forceScale() const override;
   double noiseLevel() const override;
 
+  // ---- its statics, cloth_part_statics.cpp
+  void loadPresent() override;
+  void takeTrial() override { std::swap(still_, work_.x); }   // afterwards the trial is where the round began
+  std::function<void()> wayBack() override;
+  double shift() const override;
+  double moves() const override;
+  void setProximal(double weight) override;
+  double weightOf(double rate) const override { return rate / statics_rate_; }
+  void setPencil(double rate) override;
+  StaticScales scales() const override;
+  Eigen::Map<Eigen::VectorXd> directions() override
+  {
+    return {direction_.data(), static_cast<Eigen::Index>(direction_.size())};
+  }
+  void weighDirection() override;
+  double largestTurn() const override;
+  Eigen::Vector3d load(int i) const;
+  double turnOfEdges() const;
+  double staticForceScale() const;
+
   static Eigen::Map<Eigen::Vector3d> vertex(PointVector& v, int i) { return point(v, i); }
   static Eigen::Map<const Eigen::Vector3d> vertex(const PointVector& v, int i) { return point(v, i); }
   ClothSystem& system() const { return *work_.system; }
@@ -131,7 +152,10 @@ private:
       nullptr;                ///< the set of the present step; null: the working copy has it, or there is none
   bool dependent_ = false;    ///< the averages depend on each other on the free vertices
   bool linearized_ = false;   ///< steps are one step of Newton's method
-  double statics_rate_ = 0;   ///< see minimiseWithoutInertia(); 0: steps
+  /// Of statics: the eigenvalue of a proximal term of weight 1 and the rate of setPencil() [1/s^2]; 0: steps.
+  double statics_rate_ = 0, pencil_rate_ = 0;
+  double size_ = 0;     ///< of the cloth at rest, for statics [m]
+  PointVector still_;   ///< the present configuration of statics
   std::optional<ContactProperties> contact_;
   std::shared_ptr<const std::vector<IgnoredSolid>> ignored_;   ///< null: none
   double contact_step_ = 0.0;                                  ///< [s]

@@ -2,10 +2,29 @@
 
 #include "cloth_part.h"
 #include "cloth_work.h"
-#include "cloth_statics.h"
 #include "island/island.h"
+#include "island/statics.h"
 
 namespace slender {
+
+/// The equilibria of a cloth on its own, with a working copy of its model without damping and air.
+class ClothStatics
+{
+public:
+  ClothStatics(const ClothModel& model, const NewtonConfig& newton);
+
+  /// Searches for an equilibrium and writes it into `state`, or only judges `state`. Inputs and state must have been
+  /// checked. Returns why no equilibrium was found.
+  StepFailure find(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles, StepReport& report);
+  const Eigen::Matrix3Xd& pinForces() const { return work_.pin_forces; }   ///< of the last find() [N]
+  const Eigen::VectorXd& mode() const { return statics_.mode(); }          ///< likewise
+
+private:
+  ClothWork work_;
+  ClothPart part_;
+  Equations equations_;
+  Statics statics_;
+};
 
 /// A cloth on its own, an island of one part; and statics.
 class ClothStepper::Impl : public ClothWork

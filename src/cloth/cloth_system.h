@@ -55,6 +55,8 @@ public:
   /// After setViscosity(stiffness damping / tau, ...).
   void beginStage(const ClothStage& stage, const ClothInputs& inputs);
   const PointVector& start() const { return start_; }
+  /// Until the next beginStage() potentials count from the origin.
+  void countFromOrigin() { std::fill(start_.begin(), start_.end(), 0.0); }
   const std::vector<char>& held() const { return held_; }
   /// Of inertia and mass damping, per point [N/m].
   const std::vector<double>& weights() const { return weight_; }

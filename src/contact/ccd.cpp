@@ -109,15 +109,6 @@ double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingP
   });
 }
 
-double pointSegmentLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const ApproachLimit& limit)
-{
-  const MovingPoint* const point[1] = {&p};
-  const MovingPoint* const segment[2] = {&a, &b};
-  return advance(point, segment, limit, [](const Eigen::Vector3d* p, const Eigen::Vector3d* q) -> Eigen::Vector3d {
-    return p[0] - q[0] - closestOnSegment(p[0], q[0], q[1]) * (q[1] - q[0]);
-  });
-}
-
 double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c,
                           const ApproachLimit& limit)
 {

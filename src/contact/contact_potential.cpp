@@ -147,7 +147,6 @@ double ContactPotential::Impl::restart()
   terms.clear();
   rows.clear();
   contacts.clear();
-  largest_force = 0.0;
   smallest_gap = kInfinity;
   for (BarrierStiffness& own : stiffness)
     own.restart();
@@ -266,7 +265,6 @@ double ContactPotential::Impl::addContact(const Eigen::Matrix3Xd& x, const PairG
     addMotion(gap, contact, force, own);
   }
   contacts.push_back(contact);
-  largest_force = std::max(largest_force, force * gap.weight);
   smallest_gap = std::min(smallest_gap, gap.gap);
   for (const int object : {contact.object, contact.other})
     if (object >= 0)
@@ -409,7 +407,6 @@ void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vec
   }
 }
 
-double ContactPotential::largestForce() const { return impl_->largest_force; }
 double ContactPotential::smallestGap() const { return impl_->smallest_gap; }
 double ContactPotential::stiffness(int object) const { return impl_->stiffness[object].value(); }
 

@@ -81,7 +81,7 @@ public:
   std::vector<FrictionSpring> springs;   ///< where the step begins; sorted
   std::vector<ContactTerm> terms;
   std::vector<ContactRow> rows;
-  double largest_force = 0.0, smallest_gap = 0.0;
+  double smallest_gap = 0.0;
   bool following = false;   ///< see followFriction()
 
 private:

@@ -116,14 +116,16 @@ Inertia ChainSystem::factorWhole(const HessianShift& shift)
 void ChainSystem::solve()
 {
   if (a_.closed)
-  {
-    for (int u = 0; u < 4 * a_.nodes; ++u)
-      direction_[u] = -gradient_[u];
-    matrix_.solve(direction_.data());
-    return;
-  }
+    return solveAgain();
   std::swap(direction_, reduced_);
   matrix_.band().substitute(direction_.data());
+}
+
+void ChainSystem::solveAgain()
+{
+  for (int u = 0; u < 4 * a_.nodes; ++u)
+    direction_[u] = -gradient_[u];
+  matrix_.solve(direction_.data());
 }
 
 void ChainSystem::takeReactions(int from, int to)

@@ -27,6 +27,7 @@ public:
   void evaluate(bool with_hessian, const HessianShift& shift) override;
   void closeGradient() override { system_.closeGradient(); }
   void solve() override;
+  void solveAgain() override { system_.solveAgain(); }
   AverageConstraints* averages() override { return averages_.get(); }
   void meetAverages() override;
 

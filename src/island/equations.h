@@ -82,6 +82,7 @@ public:
   /// The trial, at which a stage ended, becomes the start of the next one.
   void endStage();
   double forceScale() const;   ///< largest force [N]
+  double residual() const;     ///< largest unbalanced force [N]
   /// Iterations of conjugate gradients since the step began.
   int linearIterations() const { return linear_iterations_; }
 
@@ -93,9 +94,8 @@ public:
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   void moveAlong(double alpha);
   void accept();
-  SharedMatrix& matrix() { return matrix_; }
-  /// The solution of the matrix becomes the directions of the coupled parts.
-  void spread();
+  /// Directions := -(matrix)^-1 gradients, with the matrix last factored and the gradients of the parts as they are.
+  void solveAgain();
   /// The share of the way from the base to the trial that leaves surfaces apart.
   double roomToTrial();
 
@@ -108,6 +108,7 @@ private:
   template <class System>
   friend NewtonResult minimizeConfined(System&, double, double, const NewtonConfig&, double);
   void solve();
+  void spread();
   void saveBase();
   void restoreBase();
   double stepLimit();
@@ -117,7 +118,6 @@ private:
   double mostUnbalanced() const { return tolerances.most_unbalanced; }
   StepFailure givesUp() const;
   double slope() const;
-  double residual() const;
   double noiseLevel() const;
   Approach approach(double from, double to, double& reached);
   bool pushes() const { return solidsMove(); }

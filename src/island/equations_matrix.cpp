@@ -441,6 +441,15 @@ void Equations::keepAverages()
     }
 }
 
+void Equations::solveAgain()
+{
+  for (Part* part : parts_)
+    part->coupled ? part->takeGradient(matrix_.solution()) : part->solveAgain();
+  matrix_.solve();
+  spread();
+}
+
+/// The solution of the matrix becomes the directions of the coupled parts.
 void Equations::spread()
 {
   forParts([&](Part& part) {

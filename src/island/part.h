@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "island/average_constraints.h"
+#include "island/part_statics.h"
 #include "island/shared_matrix.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/dynamics/failure_place.h"
@@ -71,8 +72,8 @@ public:
 
 /// A part of an island: something with unknowns of its own. A rod, a thread, a cloth, and a rigid body are parts.
 /// Equations minimises the energy of several parts together, and Island advances them by substeps. Both know the parts
-/// by this class alone. A part without a surface needs none of the functions of PartSurface. Bodies come first in every
-/// loop over parts, because rods follow them.
+/// by this class alone. A part without a surface needs none of the functions of PartSurface, and a part without statics
+/// none of PartStatics. Bodies come first in every loop over parts, because rods follow them.
 ///
 /// A part has a base configuration and a trial configuration. moveAlong() makes the trial from the base and the
 /// direction; evaluate() computes everything at the trial; accept() makes the trial the new base.
@@ -83,7 +84,7 @@ public:
 ///
 /// The averages of a part may be prescribed. Directions must not change them: Equations takes care of this for coupled
 /// parts, and the other parts do so in solve(). The gradient of a part contains the forces of its averages.
-class Part : public PartInIsland, public PartSurface
+class Part : public PartInIsland, public PartSurface, public PartStatics
 {
 public:
   // ---- unknowns
@@ -127,6 +128,8 @@ public:
   virtual void closeGradient() {}
   /// direction := -(matrix)^-1 gradient of the last evaluate(true), of a part that is not coupled.
   virtual void solve() = 0;
+  /// The same with the matrix last factored, whatever the gradient is now.
+  virtual void solveAgain() { solve(); }
 
   // ---- the matrix of the island, of a coupled part
   virtual void notePattern(SharedMatrix& matrix) = 0;   ///< Notes what the part itself couples.

@@ -7,11 +7,6 @@
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
-namespace {
-
-using Eigen::Vector3d;
-
-}   // namespace
 
 GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG, const std::optional<Pose>& X_HG)
   : GuideStream(options.timing(), options.coast, options.catch_up_time),
@@ -79,7 +74,7 @@ void GuideBuffer::attachAt(const Pose& X_WG)
 void GuideBuffer::catchUpFrom(const Pose& X_WG)
 {
   last_ = {X_WG, Twist()};
-  offset_.reset();
+  endFade();
   if (following_)
     blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
 }
@@ -87,18 +82,10 @@ void GuideBuffer::catchUpFrom(const Pose& X_WG)
 void GuideBuffer::restart(const Pose& X_WG)
 {
   restartStream();
-  offset_.reset();
   held_anew_ = false;
   if (attach_ == Attach::initial)
     X_HG_ = first_X_HG_.value_or(Pose());
   last_ = {X_WG, Twist()};
-}
-
-void GuideBuffer::skip(double seconds)
-{
-  skipStream(seconds);
-  if (offset_)
-    offset_->start += seconds;
 }
 
 GuideBuffer::Motion GuideBuffer::followed(double query, double rate) const
@@ -114,11 +101,11 @@ GuideBuffer::Motion GuideBuffer::followed(double query, double rate) const
 
 GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) const
 {
-  if (!offset_ || time >= offset_->start + offset_->duration)
+  if (!fades(time))
     return followed;
-  const Offset& o = *offset_;
-  const FadeWeights w = fadeOut(time - o.start, o.duration, o.rate_duration);
-  const Vector3d r = w.value * o.r + w.slope * o.r_rate, r_rate = w.value_rate * o.r + w.slope_rate * o.r_rate;
+  const Offset& o = offset_;
+  const FadeWeights w = fade(time);
+  const Eigen::Vector3d r = w.value * o.r + w.slope * o.r_rate, r_rate = w.value_rate * o.r + w.slope_rate * o.r_rate;
   const Eigen::Quaterniond turn = fromRotationVector(r);
   Motion m;
   m.X.position = followed.X.position + w.value * o.p + w.slope * o.p_rate;
@@ -130,7 +117,7 @@ GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) co
 
 void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
 {
-  const auto differ = [](const Vector3d& a, const Vector3d& b, double scale) {
+  const auto differ = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double scale) {
     return (a - b).norm() > kSameMotion * (1.0 + scale);
   };
   const auto rotated = [](const Motion& a, const Motion& b) {
@@ -140,20 +127,16 @@ void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
   // `to` was evaluated kLimitOffset later than `from`, so the two may differ by what passes in that time.
   const double speed = (to.V.linear.norm() + to.V.angular.norm()) * kLimitOffset / kSameMotion;
   if (!differ(from.X.position, expected.X.position, speed) &&
-      !differ(rotated(from, expected), Vector3d::Zero(), speed) &&
+      !differ(rotated(from, expected), Eigen::Vector3d::Zero(), speed) &&
       (from.V.linear - expected.V.linear).norm() < 1e-4 * (1e-2 + to.V.linear.norm()) &&
       (from.V.angular - expected.V.angular).norm() < 1e-4 * (1e-2 + to.V.angular.norm()))
     return;
-  Offset o;
-  o.start = time;
+  Offset& o = offset_;
   o.p = from.X.position - to.X.position;
   o.p_rate = from.V.linear - to.V.linear;
   o.r = rotated(from, to);
   o.r_rate = rotationRate(o.r).inverse() * (from.V.angular - fromRotationVector(o.r) * to.V.angular);
-  o.rate_duration = timing_.overran() ? std::max(options_.catch_up_time, kDryBlend) : options_.catch_up_time;
-  o.duration =
-      std::max({o.rate_duration, o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning});
-  offset_ = o;
+  beginFade(time, std::max(o.p.norm() / options_.catch_up_speed, o.r.norm() / options_.catch_up_turning));
 }
 
 }   // namespace slender

@@ -22,7 +22,6 @@ PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Ei
 void PointGuideBuffer::restart(const Eigen::Matrix3Xd& points)
 {
   restartStream();
-  offset_duration_ = 0.0;
   x_ = points;
   v_.setZero(3, points.cols());
 }
@@ -62,16 +61,10 @@ void PointGuideBuffer::attachAt(const Eigen::Matrix3Xd& points)
 {
   x_ = points;
   v_.setZero(3, points.cols());
-  offset_duration_ = 0.0;
+  endFade();
   forgetPlain();
   if (following_)
     rejoin(*last_time_);
-}
-
-void PointGuideBuffer::skip(double seconds)
-{
-  skipStream(seconds);
-  offset_start_ += seconds;
 }
 
 void PointGuideBuffer::follow(double query, double rate, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const
@@ -82,10 +75,9 @@ void PointGuideBuffer::follow(double query, double rate, Eigen::Matrix3Xd& x, Ei
 
 void PointGuideBuffer::addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const
 {
-  const double d = offset_duration_;
-  if (!(d > 0.0) || time >= offset_start_ + d)
+  if (!fades(time))
     return;
-  const FadeWeights w = fadeOut(time - offset_start_, d, offset_rate_duration_);
+  const FadeWeights w = fade(time);
   x += w.value * offset_ + w.slope * offset_rate_;
   v += w.value_rate * offset_ + w.slope_rate * offset_rate_;
 }
@@ -107,9 +99,7 @@ void PointGuideBuffer::rejoin(double time)
     return;
   offset_ = x_ - to;
   offset_rate_ = v_ - to_rate;
-  offset_start_ = time;
-  offset_rate_duration_ = timing_.overran() ? std::max(options_.catch_up_time, kDryBlend) : options_.catch_up_time;
-  offset_duration_ = std::max(offset_rate_duration_, largest(offset_) / options_.catch_up_speed);
+  beginFade(time, largest(offset_) / options_.catch_up_speed);
 }
 
 }   // namespace slender

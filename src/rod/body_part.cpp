@@ -62,6 +62,22 @@ void BodyPart::addOwnContacts(bool with_hessian)
   }
 }
 
+// ---- statics
+
+StaticScales BodyPart::scales() const
+{
+  StaticScales result;
+  result.mass = system.model().mass;
+  return result;
+}
+
+void BodyPart::weighDirection()
+{
+  const Eigen::Matrix3d r = system.pose.orientation.toRotationMatrix();
+  system.gradient << -system.model().mass * direction.head<3>(),
+      -r * system.model().inertia * r.transpose() * direction.tail<3>();
+}
+
 // ---- the surface
 
 void BodyPart::gather(Eigen::Matrix3Xd& x) const

@@ -34,8 +34,6 @@ public:
   {
     projection.weld(chain, node, number_, r_B - centre_);
   }
-  /// v := matrix^-1 v with the matrix of the last evaluate(true), of a body that is not coupled.
-  void solveFor(BodySystem::Vector6& v) const { factor_.solveInPlace(v); }
   /// Begins a step from this state; gravity [m/s^2].
   void begin(const RigidBodyState& state, const Eigen::Vector3d& step_gravity);
   const RigidBodyState& state() const { return now_; }   ///< where the last accepted substep ended
@@ -123,6 +121,16 @@ private:
   bool addTo(FastProjection& projection) override;
   void giveTo(FastProjection& projection, bool at_start) override;
   StepFailure takeFrom(FastProjection& projection, const ProjectionReport& result, bool at_start) override;
+
+  // ---- its statics
+  void loadPresent() override { system.load(now_); }
+  void takeTrial() override { now_.X_WB = system.pose; }
+  void setPencil(double rate) override { system.hold(rate, gravity); }
+  StaticScales scales() const override;
+  Eigen::Map<Eigen::VectorXd> directions() override { return {direction.data(), direction.size()}; }
+  void weighDirection() override;
+  double largestTurn() const override { return direction.tail<3>().norm(); }
+
   template <class Do>
   void forCarried(const Do& apply) const;
   void compose();

@@ -159,8 +159,6 @@ void RodSystem::composeJoints(const std::vector<double>& length)
   }
   shift_x_ = 1e-2 * bend;
   shift_theta_ = twist;
-  // A rod whose frames nobody holds can spin about itself without energy (if isotropic): keep its matrix definite.
-  spin_ = clamps_.joints.empty() && holds_.turns().empty() ? 1e-8 * twist : 0.0;
 }
 
 void RodSystem::placeGrasps(const std::vector<Pose>& X_WG)

@@ -34,8 +34,6 @@ public:
   };
   void addWeld(const Weld& weld);
   RodWork& rod() const { return rod_; }
-  /// Whether an unknown has a number of its own, in the part that an inverse iteration acts on.
-  bool isUnknown(int unknown) const { return dof_[unknown] >= 0; }
 
   /// Sets what the rod touches, and which solids its points pass through. Without a call the rod touches nothing.
   void setContact(const ContactProperties& contact, const std::vector<IgnoredSolid>& ignored = {})
@@ -110,6 +108,24 @@ private:
   StepFailure takeFrom(FastProjection& projection, const ProjectionReport& result, bool at_start) override;
   void takeStart(const FastProjection& projection);
 
+  // ---- its statics, rod_part_statics.cpp
+  void loadPresent() override;
+  void takeTrial() override;
+  std::function<void()> wayBack() override;
+  double shift() const override;
+  double staticWork() const override { return twist_work_; }
+  double moves() const override;
+  void setProximal(double weight) override;
+  double weightOf(double rate) const override;
+  void setPencil(double rate) override;
+  StaticScales scales() const override;
+  Eigen::Map<Eigen::VectorXd> directions() override { return {system_.direction(), 4 * system_.nodes()}; }
+  void weighDirection() override;
+  double largestTurn() const override;
+  void addRounding(double& stiffness, double& inertia) const override;
+  double proximalUnit() const;
+  Eigen::Map<const Eigen::Matrix4Xd> columns() const { return {system_.direction(), 4, system_.nodes()}; }
+
   const RodSystem& system() const { return rod_.system; }
   bool graspsMove(bool to_rest) const;
   const Weld* weldOf(int grasp) const;
@@ -129,6 +145,7 @@ private:
   std::vector<Weld> welds_;
   int chain_ = -1;   ///< its number in the projection; -1: it stretches
   bool welded_ = false;
+  double twist_work_ = 0.0;   ///< of torques about tangents, in all searches for equilibria [J]
   long surface_version_ = 0;
   bool dependent_ = false;   ///< the prescribed averages depend on each other on the free nodes
   std::vector<std::array<int, 3>> carried_entries_;   ///< node, column, row of those with a carried unknown

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "dynamics/statics_advice.h"
 #include "island/island.h"
+#include "island/statics.h"
 #include "rod_part.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
 
-/// What steps a rod that nothing else meets.
+/// What steps a rod that nothing else meets, and finds its equilibria.
 class RodStepper::Alone
 {
 public:
@@ -18,16 +20,52 @@ public:
   {
     island_.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
     island_.setParts({&part_});
+    statics_.setParts(island_.equations(), {&part_}, rod.time.newton);
   }
 
   /// From what the rod has loaded.
   StepReport step() { return island_.step(rod_.duration, rod_.work.next_step); }
+  /// Searches for an equilibrium from `state`, or only judges `state`.
+  StepReport equilibrium(RodState& state, const RodInputs& inputs, bool search, bool leave_saddles);
+  const Eigen::VectorXd& lowestMode() const { return statics_.mode(); }
 
 private:
   RodWork& rod_;
   RodPart part_;
   Island island_;
+  Statics statics_;
 };
+
+StepReport RodStepper::Alone::equilibrium(RodState& state, const RodInputs& inputs, bool search, bool leave_saddles)
+{
+  RodInputs loads = inputs;
+  RodState start = state;
+  start.forgetHistory();
+  start.v.setZero();
+  for (GraspTarget& g : loads.grasps)
+    g.velocity.reset();
+  for (GraspState& g : start.grasps)
+    g.velocity = Twist{};
+  rod_.begin(start, loads, 1.0);
+  addFrames(*rod_.model, rod_.work);
+  rod_.system.load(rod_.work);
+  rod_.system.setTwistLoads(loads.torques);
+  const StepFailure failure = statics_.solve(search, leave_saddles);
+  StepReport report = statics_.report();
+  if (failure == StepFailure::newton_diverged && !(report.residual < kMostUnbalanced))
+    return rod_.refuse(report, failure,
+                       "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
+                       "grasp, or let it move by time stepping (start: as_given)");
+  if (failure != StepFailure::none)
+    return rod_.refuse(report, failure, explainStatics(failure));
+  rod_.computeWrenches(0.0);
+  for (std::size_t k = 0; k < start.grasps.size(); ++k)
+    if (rod_.work.grasps[k].active)
+      rod_.work.grasps[k].X_WG = {loads.grasps[k].X_WG.position, loads.grasps[k].X_WG.orientation.normalized()};
+  if (search)
+    state = rod_.work;
+  return report;
+}
 
 RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& time)
   : work_(std::make_unique<RodWork>(std::move(model), time))
@@ -36,18 +74,26 @@ RodStepper::RodStepper(std::shared_ptr<const RodModel> model, const TimeConfig& 
 RodStepper::~RodStepper() = default;
 RodStepper::RodStepper(RodStepper&&) noexcept = default;
 
+/// Returns whether a step or a search from this state can begin, and prepares it. If not, the report says why.
+bool RodStepper::accepts(const RodState& state, const RodInputs& inputs, StepReport& report)
+{
+  std::string what;
+  const bool valid = work_->inputsFinite(state, inputs, what);
+  if (!valid)
+    work_->refuse(report, StepFailure::input_not_finite, what + " is not finite or not valid; correct this input");
+  else if (!alone_)
+    alone_ = std::make_unique<Alone>(*work_);
+  return valid;
+}
+
 StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double duration)
 {
   StepReport report;
-  std::string what;
   if (!(duration > 0) || !std::isfinite(duration))
     return work_->refuse(report, StepFailure::input_not_finite,
                          "step length must be positive and finite, got " + std::to_string(duration));
-  if (!work_->inputsFinite(state, inputs, what))
-    return work_->refuse(report, StepFailure::input_not_finite,
-                         what + " is not finite or not valid; correct this input");
-  if (!alone_)
-    alone_ = std::make_unique<Alone>(*work_);
+  if (!accepts(state, inputs, report))
+    return report;
   work_->begin(state, inputs, duration);
   report = alone_->step();
   if (report.ok)
@@ -56,16 +102,21 @@ StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double dur
 }
 StepReport RodStepper::solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles)
 {
-  return work_->solveEquilibrium(state, inputs, leave_saddles);
+  StepReport report;
+  return accepts(state, inputs, report) ? alone_->equilibrium(state, inputs, true, leave_saddles) : report;
 }
 StepReport RodStepper::assessEquilibrium(const RodState& state, const RodInputs& inputs)
 {
-  return work_->assessEquilibrium(state, inputs);
+  StepReport report;
+  RodState copy = state;
+  return accepts(state, inputs, report) ? alone_->equilibrium(copy, inputs, false, false) : report;
 }
 Eigen::Map<const Eigen::Matrix4Xd> RodStepper::lowestMode() const
 {
-  const Eigen::VectorXd& mode = work_->lowest_mode;
-  return Eigen::Map<const Eigen::Matrix4Xd>(mode.data(), 4, mode.size() / 4);
+  if (!alone_)
+    return {nullptr, 4, 0};
+  const Eigen::VectorXd& mode = alone_->lowestMode();
+  return {mode.data(), 4, mode.size() / 4};
 }
 const std::vector<Wrench>& RodStepper::wrenches() const { return work_->wrenches; }
 const RodModel& RodStepper::model() const { return *work_->model; }

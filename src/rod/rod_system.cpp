@@ -24,6 +24,7 @@ void RodSystem::load(const RodState& state)
       setResponse(0.0, nullptr);
   }
   compose(state);
+  stiffenAngles(1e-8, 0.0);   // keeps the matrix of a rod definite that can spin about itself without energy
   const int n = a_.nodes, edges = a_.edges;
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < 3; ++k)

@@ -20,15 +20,11 @@ class RodWork
 public:
   RodWork(std::shared_ptr<const RodModel> model, const TimeConfig& time);
 
-  StepReport solveEquilibrium(RodState& state, const RodInputs& inputs, bool leave_saddles);
-  StepReport assessEquilibrium(const RodState& state, const RodInputs& inputs);
-
   std::shared_ptr<const RodModel> model;
   TimeConfig time;
   RodSystem system;
   std::vector<Wrench> wrenches;
-  RodState work, next;           ///< start and end of a substep
-  Eigen::VectorXd lowest_mode;   ///< of the last equilibrium, see RodStepper::lowestMode()
+  RodState work, next;   ///< start and end of a substep
   /// Of all grasps at the instant being solved for. Those of grasps carried by bodies are set from outside.
   std::vector<Pose> stage_poses;
   std::vector<Twist> carried_velocity;   ///< of the frames of grasps carried by bodies
@@ -58,6 +54,8 @@ public:
   void beginStage(std::size_t stage);
   void endStage(std::size_t stage);
   void finish(StepReport& report);
+  /// Wrenches of the grasps at the last evaluation, for a substep of h seconds; 0: at rest.
+  void computeWrenches(double h);
 
   /// From now on edges have inertia about their tangents, see RodState::spin.
   void keepSpins();
@@ -105,7 +103,6 @@ private:
   StepFailure computeAcceleration();
   Eigen::Vector3d heldVelocity(double at, int node, const Eigen::Vector3d& otherwise);
   Eigen::Vector3d combine(const Combination& c, int node) const;
-  void computeWrenches(double h);
 
   // rod_spin.cpp: turns of edges about their tangents, with inertia
   double combineTurn(const Combination& c, int edge) const;
@@ -124,12 +121,6 @@ private:
   void elasticWrenches();
   void holdNodes(double at);
 
-  // rod_statics.cpp
-  class RodEquilibrium;
-  bool beginStatics(const RodState& state, const RodInputs& loads, StepReport& report);
-  void carryFreeNodes(double weight);
-  void evaluateEquilibrium(StepReport& report);
-
   // rod_viscous.cpp: strain history of Rayleigh stiffness damping
   void startStrainHistory();
   void setViscousResponse(const Stage& stage, double h);
@@ -138,7 +129,6 @@ private:
 
   bool without_frames;   ///< a state may come without them
   const std::vector<GraspState>* origin = nullptr;
-  RodInputs statics_inputs;       ///< of an equilibrium, whose grasps stand still
   RodEvaluation end_evaluation;   ///< at the end of a substep whose stage lies inside it
   Eigen::Matrix3Xd stage_q, stage_v;
   bool spins = false;

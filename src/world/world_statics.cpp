@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "dynamics/statics_advice.h"
-#include "slender_sim/dynamics/lowest_eigenvalue.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -66,6 +65,10 @@ WorldStatics::WorldStatics(WorldObjects& objects)
 {
   for (const RodObject& rod : objects_.rods)
     lever_ = std::min(lever_, rod.stepper->model->rest_length.minCoeff());
+  std::vector<Part*> parts;
+  for (WorldObject* object : objects_.all)
+    object->addParts(parts);
+  setParts(island_.island().equations(), std::move(parts), time_.newton);
 }
 
 // ---- states of its parts
@@ -92,18 +95,43 @@ void WorldStatics::forgetSprings()
       memory.springs.clear();
 }
 
-void WorldStatics::restore(const Configuration& c)
+std::function<void()> WorldStatics::wayBack()
 {
-  work_ = c.state;
-  report_.residual = c.residual;
-  report_.max_strain = c.max_strain;
-  report_.message.clear();
+  return [this, state = work_, residual = report_.residual, max_strain = report_.max_strain] {
+    work_ = state;
+    report_.residual = residual;
+    report_.max_strain = max_strain;
+    report_.message.clear();
+  };
+}
+
+void WorldStatics::loadParts()
+{
+  begin(1.0);
+  Statics::loadParts();
+  if (island_.contact())
+    island_.island().loadStiffness(0.0);
+}
+
+void WorldStatics::takeTrial()
+{
+  Statics::takeTrial();
+  takeParts();
+}
+
+/// Takes over where the parts are now.
+void WorldStatics::takeParts()
+{
+  for (const RodObject& rod : objects_.rods)
+    work_.rods[rod.index] = rod.stepper->work;
+  for (const BodyObject& body : objects_.bodies)
+    work_.bodies[body.index] = body.part->state();
 }
 
 // ---- steps
 
 /// Loads the present configuration for a step of this duration [s].
-void WorldStatics::load(double duration)
+void WorldStatics::begin(double duration)
 {
   for (RodObject& rod : objects_.rods)
     rod.stepper->begin(work_.rods[rod.index], rod.inputs, duration);
@@ -114,14 +142,11 @@ void WorldStatics::load(double duration)
 
 StepReport WorldStatics::step(double h)
 {
-  load(h);
+  begin(h);
   const StepReport report = island_.step(h);
   if (!report.ok)
     return report;
-  for (const RodObject& rod : objects_.rods)
-    work_.rods[rod.index] = rod.stepper->work;
-  for (const BodyObject& body : objects_.bodies)
-    work_.bodies[body.index] = body.part->state();
+  takeParts();
   island_.end(work_);
   forgetSprings();
   const auto arrive = [h](const GraspTarget& target, Pose& pose, const Twist& velocity) {
@@ -180,7 +205,7 @@ bool WorldStatics::settle(double h)
       continue;
     }
     ++report_.substeps;
-    force_scale_ = std::max(force_scale_, system().forceScale());
+    force_scale_ = std::max(force_scale_, equations().forceScale());
     report_.residual = unbalanced(h) / force_scale_;
     report_.max_strain = report.max_strain;
     if (round > 0 && report_.residual < kUnbalanced)
@@ -195,32 +220,6 @@ bool WorldStatics::settle(double h)
       "the equilibrium did not settle: something may be free to drift; hold it, or let it settle by time stepping with "
       "damping (start: as_given)";
   return false;
-}
-
-// ---- leaving saddles
-
-EquilibriumStability WorldStatics::assess(bool spectrum)
-{
-  beginStability();
-  const RodEvaluation at = energyAt(0.0);
-  EquilibriumStability result;
-  result.energy = at.energy();
-  result.energy_noise = 1e-13 * (std::abs(at.stretch) + std::abs(at.bend_twist) + std::abs(at.potential));
-  if (!spectrum)
-    return result;
-  result.lowest = lowestEigenvalue([&](double s) { return definite(s); }, neutralBand()).value;
-  result.stable = result.lowest >= 0;
-  return result;
-}
-
-bool WorldStatics::displace(double turn)
-{
-  // The factor of the matrix near its lowest eigenvalue, which inverse iteration needs, belongs to the saddle: other
-  // steps came in between.
-  beginStability();
-  lowestEigenvalue([&](double s) { return definite(s); }, neutralBand());
-  findLowestMode();
-  return displaceAlongMode(turn);
 }
 
 bool WorldStatics::settleFrom(double lowest)
@@ -242,7 +241,7 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
   forgetSprings();
   if (settle(time_.step))
   {
-    settleStably(*this, true, report_);
+    settleStably(true);
     report_.message.clear();
     copy(work_, state);
     for (std::size_t r = 0; r < objects_.rods.size(); ++r)

@@ -1,17 +1,16 @@
 #pragma once
 
+#include "island/statics.h"
 #include "object_island.h"
 #include "world_objects.h"
-#include "slender_sim/dynamics/equilibrium_search.h"
 
 namespace slender {
 
 /// Static equilibrium of the rods and bodies that may meet, as one island, without friction: steps of implicit Euler
 /// that grow, from rest each time. Each minimises the energy with a proximal term whose weight is the mass over the
-/// step squared. The weight never becomes zero, because contact needs a step. An unstable equilibrium is left along its
-/// mode of negative curvature, until a stable one is found or every way was tried. Threads stay where they are, and the
-/// others do not feel them.
-class WorldStatics
+/// step squared. The weight never becomes zero, because contact needs a step. Saddles are left as Statics leaves them.
+/// Threads stay where they are, and the others do not feel them.
+class WorldStatics : Statics
 {
 public:
   /// The objects must outlive the statics.
@@ -22,36 +21,19 @@ public:
   /// the objects become those of the equilibrium. On failure the state is untouched and the report says why.
   StepReport solve(WorldState& state, const WorldInputs& inputs);
 
-  // ---- what settleStably() needs
-  EquilibriumStability assess(bool spectrum);
-  struct Configuration
-  {
-    WorldState state;
-    double residual, max_strain;
-  };
-  Configuration configuration() const { return {work_, report_.residual, report_.max_strain}; }
-  void restore(const Configuration& c);
-  bool displace(double turn);
-  bool settleFrom(double lowest);
-
 private:
-  void load(double duration);
+  void loadParts() override;
+  void takeTrial() override;
+  std::function<void()> wayBack() override;
+  bool settleFrom(double lowest) override;
+
+  void begin(double duration);
+  void takeParts();
   StepReport step(double h);
   bool settle(double h);
   double unbalanced(double h) const;
   void copy(const WorldState& from, WorldState& to) const;
   void forgetSprings();
-
-  // ---- stability, world_stability.cpp
-  void beginStability();
-  RodEvaluation energyAt(double s);
-  bool definite(double s);
-  double neutralBand() const;
-  void findLowestMode();
-  void scaleMode();
-  bool displaceAlongMode(double alpha);
-
-  Equations& system() { return island_.island().equations(); }
 
   WorldObjects& origin_;
   const TimeConfig time_;
@@ -59,8 +41,6 @@ private:
   ObjectIsland island_;
   const WorldInputs* inputs_ = nullptr;
   WorldState work_, before_;   ///< rods and bodies of the island, and all obstacles
-  StepReport report_;
-  StepFailure failure_ = StepFailure::none;
   double force_scale_ = 0.0;   ///< largest force so far [N]
   double lever_;               ///< divides moments to compare them with forces: the shortest edge [m]
 };

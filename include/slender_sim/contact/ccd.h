@@ -25,7 +25,6 @@ struct MovingPoint
 
 double segmentsLimit(const MovingPoint& a0, const MovingPoint& a1, const MovingPoint& b0, const MovingPoint& b1,
                      const ApproachLimit& limit);
-double pointSegmentLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const ApproachLimit& limit);
 double pointTriangleLimit(const MovingPoint& p, const MovingPoint& a, const MovingPoint& b, const MovingPoint& c,
                           const ApproachLimit& limit);
 

@@ -289,8 +289,7 @@ public:
   /// computed the stiffness of the terms.
   void pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
 
-  /// Largest normal force [N] and smallest softened gap [m] of the last evaluate(); 0 and infinity without contact.
-  double largestForce() const;
+  /// Smallest softened gap of the last evaluate() [m]; infinity without contact.
   double smallestGap() const;
 
   /// Force [N] of the barrier about an object at half the gap. The barrier between two objects has the larger stiffness

@@ -35,6 +35,8 @@ public:
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
   /// direction() := -K^-1 gradient of the last evaluate(true).
   void solve();
+  /// The same with the gradient as it is now.
+  void solveAgain();
   /// Trial := base + alpha direction.
   void moveAlong(double alpha);
   /// Base := trial.

@@ -61,8 +61,6 @@ public:
   /// Forgets all samples and stays at X_WG. When poses come again, the grasp catches up with its very first offset:
   /// that before any attachAt().
   void restart(const Pose& X_WG);
-  /// The simulated clock skipped `seconds` while the grasp stood still. The grasp then catches up.
-  void skip(double seconds);
 
   /// Pose of the grasp in the gripper's frame, if it was given or once the grasp follows. Identity before that, and
   /// with Attach::section.
@@ -76,8 +74,7 @@ private:
   };
   struct Offset
   {
-    double start = 0.0, duration = 0.0, rate_duration = 0.0;   // [s] of simulated time
-    Eigen::Vector3d p, p_rate, r, r_rate;   // position [m], rotation vector [rad], and rates, at `start`
+    Eigen::Vector3d p, p_rate, r, r_rate;   // position [m], rotation vector [rad], and rates, at its start
   };
 
   void join(double start) override;
@@ -96,7 +93,7 @@ private:
   bool held_anew_ = false;           // attachAt() was called since the start or since restart()
   Motion plain_;                     // motion without an offset at last_time_
   Motion last_;                      // last output
-  std::optional<Offset> offset_;
+  Offset offset_;
 };
 
 }   // namespace slender

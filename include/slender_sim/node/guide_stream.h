@@ -20,14 +20,26 @@ public:
   const GuideTiming& timing() const { return timing_; }
   /// See GuideTiming::lagAtLeast().
   void lagAtLeast(double lag) { timing_.lagAtLeast(lag); }
+  /// The simulated clock skipped `seconds` while the output stood still. What follows the stream then catches up.
+  void skip(double seconds)
+  {
+    timing_.skip(seconds);
+    query_ += seconds;
+    fade_start_ += seconds;
+    forgetPlain();
+    if (last_time_)
+      *last_time_ += seconds;
+    changed_ = true;
+  }
 
 protected:
   /// `coast` [s] >= 0: within this time the motion comes to rest when no sample comes. With 0 the last sample is held.
-  /// `blend` [s] >= 0: shortest time in which the derived class blends from rest to the speed of a stream, or back. If
-  /// the interval of the samples is shorter, streams may begin and end in motion. Otherwise they begin and end at rest.
+  /// `blend` [s] > 0: shortest time in which an offset fades, from rest to the speed of a stream, or back. If the
+  /// interval of the samples is shorter, streams may begin and end in motion. Otherwise they begin and end at rest.
   GuideStream(const GuideTiming::Options& timing, double coast, double blend)
     : timing_(timing),
       coast_(coast),
+      blend_(blend),
       cut_(timing.delay > 0.0 || timing.automatic ? blend : 0.0)   // without a lag each new sample is an end at first
   {
   }
@@ -95,25 +107,28 @@ protected:
     last_time_ = time;
   }
 
-  /// Forgets all samples.
+  /// An offset between the output and the trajectory begins at simulated `time` [s]. It fades within `catch_up` [s],
+  /// or in the shortest time of blending if that is longer.
+  void beginFade(double time, double catch_up)
+  {
+    fade_start_ = time;
+    fade_rate_duration_ = timing_.overran() ? std::max(blend_, kDryBlend) : blend_;
+    fade_duration_ = std::max(fade_rate_duration_, catch_up);
+  }
+  void endFade() { fade_duration_ = 0.0; }
+  /// Whether there is an offset at this time.
+  bool fades(double time) const { return fade_duration_ > 0.0 && time < fade_start_ + fade_duration_; }
+  FadeWeights fade(double time) const { return fadeOut(time - fade_start_, fade_duration_, fade_rate_duration_); }
+
+  /// Forgets all samples, and the offset.
   void restartStream()
   {
+    endFade();
     timing_.restart();
     trajectory_ = Trajectory();
     next_.reset();
     last_stamp_.reset();
     following_ = changed_ = open_ = false;
-  }
-
-  /// The simulated clock skipped `seconds` while the output stood still.
-  void skipStream(double seconds)
-  {
-    timing_.skip(seconds);
-    query_ += seconds;
-    forgetPlain();
-    if (last_time_)
-      *last_time_ += seconds;
-    changed_ = true;
   }
 
   GuideTiming timing_;
@@ -159,7 +174,8 @@ private:
     rate_ = now.rate;
   }
 
-  double coast_, cut_;
+  double coast_, blend_, cut_;
+  double fade_start_ = 0.0, fade_duration_ = 0.0, fade_rate_duration_ = 0.0;   // [s]; no offset while it lasts for 0
   std::optional<Trajectory> next_;     // of a new stream that has not taken effect yet
   std::optional<double> last_stamp_;   // [s] of the last sample
   bool changed_ = false;               // the trajectory changed since the last query

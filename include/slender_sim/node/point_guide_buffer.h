@@ -28,8 +28,6 @@ public:
   void attachAt(const Eigen::Matrix3Xd& points);
   /// Forgets all samples and stays at `points`.
   void restart(const Eigen::Matrix3Xd& points);
-  /// The simulated clock skipped `seconds` while the guide stood still. The guide then catches up.
-  void skip(double seconds);
 
 private:
   void join(double start) override;
@@ -40,10 +38,8 @@ private:
   void addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const;
 
   GuideBuffer::Options options_;
-  Eigen::Matrix3Xd plain_x_, plain_v_;   // motion without an offset at last_time_; empty when it is not known
-  Eigen::Matrix3Xd x_, v_;               // last output
-  // [s]; no offset while the duration is 0
-  double offset_start_ = 0.0, offset_duration_ = 0.0, offset_rate_duration_ = 0.0;
+  Eigen::Matrix3Xd plain_x_, plain_v_;      // motion without an offset at last_time_; empty when it is not known
+  Eigen::Matrix3Xd x_, v_;                  // last output
   Eigen::Matrix3Xd offset_, offset_rate_;   // [m], [m/s] at the start
 };
 

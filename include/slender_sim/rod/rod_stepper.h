@@ -76,8 +76,10 @@ public:
 
 private:
   class Alone;
+  bool accepts(const RodState& state, const RodInputs& inputs, StepReport& report);
+
   std::unique_ptr<RodWork> work_;
-  std::unique_ptr<Alone> alone_;   ///< what step() needs; null before its first call
+  std::unique_ptr<Alone> alone_;   ///< of steps and equilibria; null before the first one
 };
 
 }   // namespace slender

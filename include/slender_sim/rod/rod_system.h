@@ -47,6 +47,12 @@ public:
   void setSpin(int edge, double weight, double target) { spin_inertia_.set(edge, weight, target); }
   /// Sets by how much an edge turns from the base to the trial [rad]. If the turn is prescribed, it stays as it is.
   void setTurn(int edge, double turn);
+  /// Adds an inertia about the tangents to the diagonal of the matrix [N m], until the next load(). Rods whose frames
+  /// nobody holds, which can spin without energy, also get a share of the twist stiffness.
+  void stiffenAngles(double share, double inertia)
+  {
+    spin_ = (clamps_.joints.empty() && holds_.turns().empty() ? share * shift_theta_ : 0.0) + inertia;
+  }
   /// Work of these torques on the way from the state of load() to the trial [J].
   double twistWork() const;
 
