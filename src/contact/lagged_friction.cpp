@@ -218,7 +218,15 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
     const bool same = old != lagged.end() && !comes_before(contact, *old);
     change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
     largest = std::max(largest, contact.force.norm());
-    if (same)
+    if (same && predicted)
+    {
+      // It stays where it was. If the material points that touch were taken from an iterate, they would have moved
+      // apart by the end of the step, and what turns with a solid would creep.
+      const Eigen::Vector3d force = contact.force;
+      contact = *old++;
+      contact.force = force;
+    }
+    else if (same)
     {
       contact.has_iterate = old->has_iterate;
       contact.last_slip = old->last_slip;

@@ -273,6 +273,14 @@ double Equations::incrementSize() const
   return std::max(largest, tolerance_ * moved_sticking_ / kStick);
 }
 
+/// Returns whether friction that sticks would hardly move in the next iteration, if increments shrink by this rate.
+/// What it moves in each step adds up to a creep.
+bool Equations::sticksAfter(double rate) const
+{
+  constexpr double kHardly = 1e-3;   // of the range in which friction sticks
+  return rate * moved_sticking_ <= kHardly;
+}
+
 /// Measures how far the direction moves touching surfaces relative to each other. Unless that is far, friction follows.
 void Equations::measureContacts()
 {

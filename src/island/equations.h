@@ -113,6 +113,7 @@ private:
   void restoreBase();
   double stepLimit();
   double incrementSize() const;
+  bool sticksAfter(double rate) const;
   void measureContacts();
   bool anglesMayKeepShift() const { return tolerances.angles_may_keep_shift; }
   double mostUnbalanced() const { return tolerances.most_unbalanced; }

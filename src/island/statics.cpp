@@ -233,8 +233,10 @@ RodEvaluation Statics::load()
   equations_->setExact(true);
   if (ContactPotential* contact = equations_->contact())
   {
-    // Friction sticks below its slip speed over the whole step. In a step without end nothing sticks.
+    // Friction sticks below its slip speed over the whole step. In a step without end nothing sticks. The springs of a
+    // step before it would store an energy that has no meaning here.
     constexpr double kForever = 1e15;
+    contact->setSprings({});
     contact->begin(equations_->startPoints(), equations_->startSolids(), kForever);
   }
   for (Part* part : parts_)

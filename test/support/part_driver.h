@@ -86,6 +86,7 @@ struct PartDriver
   double forceScale() const { return part.forceScale(); }
   double noiseLevel() const { return part.noiseLevel(); }
   static constexpr bool anglesMayKeepShift() { return false; }
+  static constexpr bool sticksAfter(double) { return true; }
   StepFailure givesUp() const { return part.givesUp(); }
   static constexpr double mostUnbalanced() { return 1e-3; }
 };

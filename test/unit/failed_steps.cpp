@@ -69,9 +69,9 @@ void expectHalvesLikeFresh(const std::string& what, const State& start, double l
 {
   constexpr int kMost = 24;   // iterations
   int found = 0;
-  for (int k = 0; k < 8 * kMost && found < 2; ++k)
+  for (int k = 0; k < 16 * kMost && found < 2; ++k)
   {
-    const double h = std::ldexp(longest, -(k / kMost));
+    const double h = longest * std::exp2(-0.25 * (k / kMost));
     NewtonConfig newton;
     newton.max_iterations = 1 + k % kMost;
     auto halved = make(newton, h);

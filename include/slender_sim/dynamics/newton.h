@@ -36,7 +36,8 @@ bool isLastIncrement(System& system, const NewtonConfig& config, const HessianSh
   constexpr double kSlowest = 0.3;   // rate from which on two increments tell nothing of the next one
   constexpr double kSafety = 0.3;
   if (shift.none() && increment < kSlowest * before &&
-      increment * increment <= kSafety * (before - increment) * config.tolerance)
+      increment * increment <= kSafety * (before - increment) * config.tolerance &&
+      system.sticksAfter(increment / before))
     return true;
   if (increment <= config.tolerance && shift.none())
     return true;
