@@ -34,7 +34,7 @@ bool isLastIncrement(System& system, const NewtonConfig& config, const HessianSh
                      double before)
 {
   constexpr double kSlowest = 0.3;   // rate from which on two increments tell nothing of the next one
-  constexpr double kSafety = 0.3;
+  constexpr double kSafety = 0.5;
   if (shift.none() && increment < kSlowest * before &&
       increment * increment <= kSafety * (before - increment) * config.tolerance &&
       system.sticksAfter(increment / before))
