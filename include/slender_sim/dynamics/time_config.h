@@ -17,7 +17,7 @@ const char* toString(Integrator integrator);
 
 struct NewtonConfig
 {
-  double tolerance = 1e-6;   ///< largest accepted last increment, as a fraction of the shortest edge (1e-14, 1e-1)
+  double tolerance = 1e-6;   ///< largest error of a solution, as a fraction of the shortest edge (1e-14, 1e-1)
   int max_iterations = 30;   ///< [1, 1000]
   int max_cuts = 10;         ///< how often a failing step is halved [0, 30]
   bool one_step = false;     ///< takes one full step of Newton's method, whose end is not in balance

@@ -44,8 +44,8 @@ TimeConfig readTime(const YamlCursor& at)
   time.min_step = std::min(time.min_step, time.step);
   YamlMap newton(map.get("newton", "Settings of the solver of implicit steps (Newton's method)."));
   newton.get("tolerance", time.newton.tolerance, Range::between(1e-14, 1e-1),
-             "A step is solved when the last change of the positions is smaller than this fraction of the shortest "
-             "edge. Without the key: 1e-6.");
+             "A step is solved when the change of the positions that is left is smaller than this fraction of the "
+             "shortest edge. Without the key: 1e-6.");
   newton.get("max_iterations", time.newton.max_iterations, Range::closed(1, 1000),
              "Number of Newton iterations after which a step counts as failed. Without the key: 30.");
   newton.get("max_cuts", time.newton.max_cuts, Range::closed(0, 30),
