@@ -119,8 +119,7 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
     {
       system.moveAlong(1.0);
       trial = system.evaluate(false);
-      const double residual = system.residual();
-      const double scale = system.forceScale();
+      const double residual = system.residual(), scale = system.forceScale();
       result.residual = scale > 0.0 ? residual / scale : 0.0;   // without forces nothing is out of balance
       result.max_strain = trial.max_strain;
       const bool balanced = result.residual <= system.mostUnbalanced() || residual <= system.noiseLevel();
