@@ -42,8 +42,8 @@ public:
   // ---- energies
   /// Number of moves in which what is prescribed can be carried to its targets. 0: all of it is there.
   virtual double moves() const { return 0.0; }
-  /// Sets the loads and a proximal term about the trial, whose free points may move before. The weight is in a unit of
-  /// the part, see weightOf().
+  /// Sets the loads and a proximal term about the trial. A part may move free points of the trial first. The weight is
+  /// in a unit of the part, see weightOf().
   virtual void setProximal(double) {}
   /// The weight whose proximal term has this eigenvalue [1/s^2]. It may be infinite or not a number.
   virtual double weightOf(double) const { return 0.0; }
