@@ -153,7 +153,7 @@ void ContactPotential::Impl::beginFollowing()
 
 void ContactPotential::Impl::follow(const std::vector<Eigen::Vector3d>& moves)
 {
-  constexpr double kFar = 10.0;   // smallest gaps: the change of a force is not linear over such distances
+  constexpr double kFar = 3.0;   // smallest gaps: the change of a force is not linear over such distances
   following =
       std::all_of(moves.begin(), moves.end(), [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap; });
   predicted_ = contacts;

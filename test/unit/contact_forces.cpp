@@ -348,7 +348,7 @@ TEST(ContactFriction, FollowsPredictedForces)
   const Eigen::Matrix3Xd there = at(0.002).colwise() + h * side, back = at(0.002).colwise() - h * side;
   EXPECT_NEAR(potential.evaluate(there, solids, false) - potential.evaluate(back, solids, false), 2 * h * force,
               1e-6 * 2 * h * force);
-  predict(0.002, 11 * potential.smallestGap());   // too far
+  predict(0.002, 4 * potential.smallestGap());   // too far
   potential.evaluate(at(0.002), solids, true);
   EXPECT_NEAR(friction(), force, 1e-9 * force);
   // Friction follows twenty times, so that a minimisation ends.

@@ -250,7 +250,7 @@ public:
   /// stiffness. The next evaluate() with stiffness first gives friction the normal forces that the terms predict, to
   /// first order, for the end of the iteration. They are closer to the solution than those of the iterates, in which
   /// gaps are too small or too large. Friction does not change if the change is negligible, or if a contact moves by
-  /// more than ten times the smallest gap. A constant is added to the potential, so that the potential does not jump.
+  /// more than three times the smallest gap. A constant is added to the potential, so that the potential does not jump.
   /// Friction follows a limited number of times after begin(), because a minimisation might not end otherwise.
   /// beginSolution() forgets the directions before.
   void followFriction(const std::vector<Eigen::Vector3d>& moves);
