@@ -53,7 +53,7 @@ StepFailure ClothStatics::find(ClothState& state, const ClothInputs& inputs, boo
   return StepFailure::none;
 }
 
-/// Searches for an equilibrium from `state`, or only judges `state`.
+/// Searches for an equilibrium from `state`. Without `search` it only tells whether `state` is stable.
 StepReport ClothStepper::Impl::statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles)
 {
   StepReport report;

@@ -189,7 +189,7 @@ private:
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
-  std::vector<Contact> predicted_;   ///< contacts of the last evaluation, with forces as follow() predicts them
+  std::vector<Contact> predicted_;   ///< contacts, with the forces that follow() has predicted
   int follows_left_ = 0;             ///< how often friction may still follow before the next begin()
   double shift_ = 0.0;               ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;

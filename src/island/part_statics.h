@@ -17,8 +17,8 @@ struct StaticScales
   int points = 0;
 };
 
-/// What Statics needs of a part. The part keeps a present configuration, from which each solution starts. A part
-/// without these functions has no statics.
+/// The functions of a part that Statics calls. The part keeps a present configuration, from which each solution starts.
+/// A part without these functions has no statics.
 class PartStatics
 {
 public:

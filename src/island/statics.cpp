@@ -295,7 +295,7 @@ double Statics::neutralBand() const
   if (const ContactPotential* contact = equations_->contact())
     for (const ContactTerm& term : contact->terms())
       all.largest = std::max(all.largest, 4 * term.stiffness.norm() / all.least_mass);
-  // Rounding errors of the entries of the largest eigenvalue add up like a random walk.
+  // Rounding errors of different points are independent, so that they cancel in part.
   const double rounding = std::numeric_limits<double>::epsilon() * all.largest / std::sqrt(std::max(1, all.points));
   const double bending = std::isfinite(all.bending) ? all.bending / all.mass : 0.0;
   return std::max(kLeast, kNeutralShare * bending + 4.0 * rounding);

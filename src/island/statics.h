@@ -39,7 +39,7 @@ public:
   /// the residual of the report is not small. Without `search` it only judges the present configuration, which must be
   /// stationary.
   StepFailure solve(bool search, bool leave_saddles);
-  /// Of the last solve(): residual, strain, energy, stability and counts.
+  /// Returns residual, strain, energy, stability and counts of the last solve().
   const StepReport& report() const { return report_; }
   /// Mode of the lowest eigenvalue of the last equilibrium: the directions of all parts. No edge turns by more than 1
   /// rad, and its largest entry is positive. Zero if none was found.

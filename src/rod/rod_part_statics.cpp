@@ -68,8 +68,9 @@ double RodPart::proximalUnit() const
 
 double RodPart::weightOf(double rate) const { return rate * rod_.model->mass.maxCoeff() / proximalUnit(); }
 
-/// Free nodes, and what the proximal term holds them to, go along with the grasps, by the displacements of the held
-/// nodes before and after them. Otherwise a move longer than an edge would fold the rod next to the grasp.
+/// Moves free nodes, and the positions to which the proximal term holds them, along with the grasps: by the
+/// displacements of the held nodes before and after them. Otherwise a move longer than an edge would fold the rod next
+/// to the grasp.
 void RodPart::setProximal(double weight)
 {
   const int n = system_.nodes();

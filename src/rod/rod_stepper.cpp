@@ -25,7 +25,7 @@ public:
 
   /// From what the rod has loaded.
   StepReport step() { return island_.step(rod_.duration, rod_.work.next_step); }
-  /// Searches for an equilibrium from `state`, or only judges `state`.
+  /// Searches for an equilibrium from `state`. Without `search` it only tells whether `state` is stable.
   StepReport equilibrium(RodState& state, const RodInputs& inputs, bool search, bool leave_saddles);
   const Eigen::VectorXd& lowestMode() const { return statics_.mode(); }
 

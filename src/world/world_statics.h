@@ -9,7 +9,7 @@ namespace slender {
 /// Static equilibrium of the rods and bodies that may meet, as one island, without friction: steps of implicit Euler
 /// that grow, from rest each time. Each minimises the energy with a proximal term whose weight is the mass over the
 /// step squared. The weight never becomes zero, because contact needs a step. Saddles are left as Statics leaves them.
-/// Threads stay where they are, and the others do not feel them.
+/// Threads stay where they are, and exert no forces on the other objects.
 class WorldStatics : Statics
 {
 public:
