@@ -50,6 +50,13 @@ public:
     Eigen::Matrix3d last_stiffness = Eigen::Matrix3d::Zero();
   };
 
+  /// Normal force of a contact at the end of an iteration, as follow() predicts it [N].
+  struct PredictedForce
+  {
+    std::int64_t first, second;   ///< of the contact
+    double size;
+  };
+
   Impl(ContactSurface surface, const ContactOptions& options);
 
   double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
@@ -189,9 +196,9 @@ private:
 
   std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
-  std::vector<Contact> predicted_;   ///< contacts, with the forces that follow() has predicted
-  int follows_left_ = 0;             ///< how often friction may still follow before the next begin()
-  double shift_ = 0.0;               ///< constant of the potential, see followFriction() [J]
+  std::vector<PredictedForce> predicted_;   ///< if friction follows: one per contact, in their order
+  int follows_left_ = 0;                    ///< how often friction may still follow before the next begin()
+  double shift_ = 0.0;                      ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;

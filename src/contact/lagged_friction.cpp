@@ -156,13 +156,12 @@ void ContactPotential::Impl::follow(const std::vector<Eigen::Vector3d>& moves)
   constexpr double kFar = 3.0;   // smallest gaps: the change of a force is not linear over such distances
   following =
       std::all_of(moves.begin(), moves.end(), [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap; });
-  predicted_ = contacts;
-  for (std::size_t k = 0; k < predicted_.size(); ++k)   // The normal terms come first, in the order of the contacts.
+  predicted_.clear();
+  for (std::size_t k = 0; following && k < contacts.size(); ++k)   // The normal terms come first, in this order.
   {
-    Eigen::Vector3d& force = predicted_[k].force;
-    const double size = force.norm();
-    if (size > 0.0)
-      force *= std::max(0.0, 1.0 - force.dot(terms[k].stiffness * moves[k]) / (size * size));
+    const Contact& c = contacts[k];
+    const double size = c.force.norm(), change = -c.force.normalized().dot(terms[k].stiffness * moves[k]);
+    predicted_.push_back({c.first, c.second, std::max(0.0, size + change)});
   }
 }
 
@@ -192,11 +191,12 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
 /// forces it takes the predicted ones of the same contacts.
 double ContactPotential::Impl::lagFriction(double least, bool predicted)
 {
-  const auto comes_before = [](const Contact& a, const Contact& b) {
+  const auto comes_before = [](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : a.second < b.second;
   };
   double change = 0.0, largest = 0.0;
-  auto old = lagged.begin(), before = predicted_.begin();
+  auto old = lagged.begin();
+  auto before = predicted_.begin();
   rubbing_.clear();
   for (const Contact& present : contacts)
   {
@@ -205,14 +205,14 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
       continue;
     if (predicted)
     {
-      before = std::find_if(before, predicted_.end(), [&](const Contact& c) { return !comes_before(c, present); });
+      before = std::find_if(before, predicted_.end(), [&](const auto& p) { return !comes_before(p, present); });
       if (before == predicted_.end() || comes_before(present, *before))
         continue;
     }
     Contact& contact = rubbing_.emplace_back(present);
     contact.friction = friction;
     if (predicted)
-      contact.force = before->force.norm() * present.force.normalized();
+      contact.force = before->size * present.force.normalized();
     for (; old != lagged.end() && comes_before(*old, contact); ++old)
       change = std::max(change, old->force.norm());
     const bool same = old != lagged.end() && !comes_before(contact, *old);
