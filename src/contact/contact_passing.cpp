@@ -1,4 +1,4 @@
-// What may have passed through a cloth although no iterate of a solution touched it.
+// What may have passed through a cloth or a curve although no iterate of a solution touched it.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,60 +10,70 @@ namespace slender {
 void ContactPotential::Impl::takeDisplacements(const Eigen::Matrix3Xd& x_end)
 {
   displacements_.assign(surface.objects.size(), {});
+  const auto include = [&](int object, int a, int b) {
+    Displacements& own = displacements_[object];
+    for (const int point : {a, b})
+      own.box.include(x_end.col(point) - x_begin.col(point));
+    own.shortest_edge = std::min(own.shortest_edge, (x_end.col(b) - x_end.col(a)).norm());
+  };
   for (const ContactSegment& s : surface.segments)
-    for (const int point : {s.a, s.b})
-      displacements_[s.object].box.include(x_end.col(point) - x_begin.col(point));
+    include(s.object, s.a, s.b);
   for (const ContactTriangle& t : surface.triangles)
+  {
     for (int k = 0; k < 3; ++k)
-    {
-      const int a = t.corner[k], b = t.corner[(k + 1) % 3];
-      Displacements& own = displacements_[t.object];
-      own.box.include(x_end.col(a) - x_begin.col(a));
-      own.shortest_edge = std::min(own.shortest_edge, (x_end.col(b) - x_end.col(a)).norm());
-    }
+      include(t.object, t.corner[k], t.corner[(k + 1) % 3]);
+    displacements_[t.object].has_triangles = true;
+  }
 }
 
-/// Whether anything has moved far against a cloth since begin(), measured by the shortest edge of the cloth. What moves
-/// less cannot get from one side to the other without coming near the rim.
+/// Whether anything has moved far against a cloth or a curve since begin(), measured by its shortest edge. What moves
+/// less cannot get from one side to the other without coming near the rim or the end.
 bool ContactPotential::Impl::movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
 {
   constexpr double kFar = 0.5;   // of the shortest edge
   takeDisplacements(x_end);
-  const auto far = [&](const Displacements& cloth, const BoundingBox& other) {
+  const auto far = [&](const Displacements& object, const BoundingBox& other) {
     const Eigen::Vector3d most =
-        (cloth.box.high - other.low).cwiseAbs().cwiseMax((other.high - cloth.box.low).cwiseAbs());
-    return most.norm() > kFar * cloth.shortest_edge;
+        (object.box.high - other.low).cwiseAbs().cwiseMax((other.high - object.box.low).cwiseAbs());
+    return most.norm() > kFar * object.shortest_edge;
   };
   for (std::size_t i = 0; i < displacements_.size(); ++i)
   {
-    const Displacements& cloth = displacements_[i];
-    if (!std::isfinite(cloth.shortest_edge) || !surface.objects[i].others)
+    const Displacements& object = displacements_[i];
+    if (!std::isfinite(object.shortest_edge) || !surface.objects[i].others)
       continue;
     for (std::size_t k = 0; k < displacements_.size(); ++k)
       if (const BoundingBox& other = displacements_[k].box;
-          k != i && surface.objects[k].others && other.low.x() <= other.high.x() && far(cloth, other))
+          k != i && surface.objects[k].others && other.low.x() <= other.high.x() && far(object, other))
         return true;
-    for (std::size_t k = 0; k < solids_end.size(); ++k)
+    for (std::size_t k = 0; k < solids_end.size() && object.has_triangles; ++k)
     {
       const Eigen::Vector3d way = solids_end[k].position - solids_begin[k].position;
-      if (far(cloth, {way, way}))
+      if (far(object, {way, way}))
         return true;
     }
   }
   return false;
 }
 
-bool ContactPotential::Impl::passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
+bool ContactPotential::Impl::passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
 {
-  if (sheets_.empty() || !movedFar(x_end, solids_end))
+  if (!movedFar(x_end, solids_end))
     return false;
   swept_.build(surface, sheets_, solids, {x_begin, x_end, solids_begin, solids_end}, options.gap, 0.0, 0.0);
   ApproachLimit limit;
-  // Only middle surfaces that cross count. Surfaces that slide may come nearer than their thickness on straight ways.
+  // Only middle surfaces and centrelines that cross count. Surfaces that slide may come nearer than their thickness on
+  // straight ways.
   limit.thickness = 0.0;
   limit.reach = 1e-3 * options.gap;
   const auto motion = [&](int i) { return MovingPoint{x_begin.col(i), x_end.col(i)}; };
   const auto crosses = [](double share) { return share > 0.0 && share < 1.0; };   // 0: they cross at the start
+  for (const GridPairs::Pair& pair : swept_.pairs())
+  {
+    const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+    if (a.object != b.object && crosses(segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit)))
+      return true;
+  }
   for (const SheetCandidates::Pair& pair : swept_.sheets().pairs())
   {
     if (pair.edges)

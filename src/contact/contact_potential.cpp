@@ -378,9 +378,9 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   return impl_->stepLimit(x, x_end, solids, solids_end);
 }
 
-bool ContactPotential::passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
+bool ContactPotential::passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
 {
-  return impl_->passedSheet(x_end, solids_end);
+  return impl_->passedThrough(x_end, solids_end);
 }
 
 double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,

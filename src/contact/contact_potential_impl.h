@@ -67,10 +67,11 @@ public:
   void beginFollowing();
   void follow(const std::vector<Eigen::Vector3d>& moves);
   double lagFriction(double least = 0.0, bool predicted = false);
+  void relax(double change);
   void keepSprings(const std::vector<Pose>& poses);
   void letPass(const SurfaceMotion& motion);
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
-  bool passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
+  bool passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
   const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
   void setPieces(const ContactSurface& pieces);
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
@@ -96,7 +97,8 @@ private:
   struct Displacements
   {
     BoundingBox box = BoundingBox::empty();
-    double shortest_edge = std::numeric_limits<double>::infinity();   ///< of its triangles [m]; infinite without any
+    double shortest_edge = std::numeric_limits<double>::infinity();   ///< [m]; infinite without edges
+    bool has_triangles = false;
   };
   void takeDisplacements(const Eigen::Matrix3Xd& x_end);
   bool movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
@@ -198,7 +200,10 @@ private:
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
   std::vector<PredictedForce> predicted_;   ///< if friction follows: one per contact, in their order
   int follows_left_ = 0;                    ///< how often friction may still follow before the next begin()
-  double shift_ = 0.0;                      ///< constant of the potential, see followFriction() [J]
+  /// Result of the last lagFriction() without prediction, and the share of the changes of forces that the next one
+  /// takes over.
+  double last_change_ = kInfinity, relaxation_ = 1.0;
+  double shift_ = 0.0;   ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
   SheetPieces sheets_;
   HeldPieces held_;

@@ -149,6 +149,8 @@ void ContactPotential::Impl::beginFollowing()
   constexpr int kMostFollows = 20;   // Contacts that alternately stick and slip would follow without end.
   following = false;
   follows_left_ = kMostFollows;
+  last_change_ = kInfinity;
+  relaxation_ = 1.0;
 }
 
 void ContactPotential::Impl::follow(const std::vector<Eigen::Vector3d>& moves)
@@ -228,6 +230,7 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
     }
     else if (same)
     {
+      contact.force = old->force + relaxation_ * (contact.force - old->force);
       contact.has_iterate = old->has_iterate;
       contact.last_slip = old->last_slip;
       contact.last_force = old->last_force;
@@ -250,9 +253,22 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
     largest = std::max(largest, contact.force.norm());
   const double share = largest > 0.0 ? change / largest : 0.0;
   shift_ = 0.0;
+  if (!predicted)
+    relax(share);
   if (share >= least)
     lagged.swap(rubbing_);
   return share;
+}
+
+/// Solutions with lagged friction may alternate between two states. If the change of the forces hardly becomes smaller,
+/// friction takes over only a part of it from then on.
+void ContactPotential::Impl::relax(double change)
+{
+  constexpr double kHardly = 0.7;   // of the change before; alternation keeps it at 1, convergence at 0.3 or less
+  constexpr double kLeast = 0.25;
+  if (change > kHardly * last_change_)
+    relaxation_ = std::max(kLeast, 0.5 * relaxation_);
+  last_change_ = change;
 }
 
 /// The spring of a contact, without its tension.

@@ -53,7 +53,7 @@ const char* toString(StepFailure failure)
     case StepFailure::energy_grew: return "energy_grew";
     case StepFailure::overstretched: return "overstretched";
     case StepFailure::work_exceeded: return "work_exceeded";
-    case StepFailure::passed_sheet: return "passed_sheet";
+    case StepFailure::passed_through: return "passed_through";
     case StepFailure::interrupted: return "interrupted";
     case StepFailure::turned_too_far: return "turned_too_far";
   }

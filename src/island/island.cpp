@@ -302,8 +302,8 @@ StepFailure Island::attempt(const Substep& substep, StepReport& report)
   if (solved != StepFailure::none)
     return solved;
   if (ContactPotential* contact = equations_.contact();
-      contact && substep.may_halve && contact->passedSheet(equations_.startPoints(), equations_.startSolids()))
-    return StepFailure::passed_sheet;
+      contact && substep.may_halve && contact->passedThrough(equations_.startPoints(), equations_.startSolids()))
+    return StepFailure::passed_through;
   if (conserving_ && energyAtEnd() > most_energy_)
     return StepFailure::energy_grew;
   if (ContactPotential* contact = equations_.contact())
@@ -336,7 +336,7 @@ void Island::accept(const Substep& substep)
 
 bool Island::shorterMayHelp(StepFailure failure) const
 {
-  if (failure == StepFailure::passed_sheet)
+  if (failure == StepFailure::passed_through)
     return true;
   return !isExplicit(time_.integrator) && (failed_ >= parts_.size() || parts_[failed_]->shorterMayHelp(failure));
 }

@@ -365,6 +365,33 @@ TEST(ContactFriction, FollowsPredictedForces)
   EXPECT_GT(potential.lagFriction(), 0.1);
 }
 
+/// Solutions alternate between a place below and a place above that of the balance, because each of them follows from
+/// the friction before it. The normal forces of friction go to the mean.
+TEST(ContactFriction, AlternatingForcesAreDamped)
+{
+  SegmentOnFloor on_floor;
+  ContactPotential& potential = on_floor.potential;
+  constexpr double kDeep = 0.0005;   // [m]
+  const auto solve = [&](double deep) {
+    potential.evaluate(on_floor.x.colwise() - Eigen::Vector3d(0, 0, deep), on_floor.solids, false);
+    return potential.terms()[0].force.norm();
+  };
+  const auto friction = [&] { return potential.terms().back().force.norm(); };
+  potential.begin(on_floor.x.colwise() - Eigen::Vector3d(1.0, 0, 0), on_floor.solids, SegmentOnFloor::kStep);   // slips
+  const double low = solve(-kDeep), high = solve(kDeep), mean = 0.5 * (low + high);
+  for (int k = 0; k < 4; ++k)
+  {
+    solve(k % 2 == 0 ? kDeep : -kDeep);
+    potential.lagFriction();
+  }
+  solve(kDeep);
+  EXPECT_LT(std::abs(friction() / SegmentOnFloor::kFriction - mean), 0.6 * (high - mean));   // 1 without damping
+  potential.begin(on_floor.x, on_floor.solids, SegmentOnFloor::kStep);   // the next step begins undamped
+  solve(kDeep);
+  potential.lagFriction();
+  EXPECT_EQ(potential.lagFriction(), 0.0);
+}
+
 /// Springs of friction go on with the force that the last step left, which normal forces limit but do not change, and
 /// turn with what touches.
 TEST(ContactFriction, SpringsLastFromStepToStep)

@@ -258,7 +258,7 @@ TEST(ContactSheetMotion, WhatPassesACloth)
     x.rightCols(3).colwise() += rod;
     std::vector<Pose> solids = s.solids;
     solids[0].position += ball;
-    return potential.passedSheet(x, solids);
+    return potential.passedThrough(x, solids);
   };
   const Vector none = Vector::Zero(), down(0, 0, -0.1), past(0.4, 0, -0.1);
   EXPECT_FALSE(passes(none, none, none));
@@ -269,6 +269,25 @@ TEST(ContactSheetMotion, WhatPassesACloth)
   EXPECT_FALSE(passes(none, -past, none));
   EXPECT_FALSE(passes(down, down, down));   // all of them together
   EXPECT_FALSE(passes(0.4 * down, 0.4 * down, none));
+}
+
+/// The straight way of a rod leads through another rod, past its end, or is too short to be examined.
+TEST(ContactSheetMotion, WhatPassesACurve)
+{
+  Scene s;
+  s.addRod({0.0, 0.0, 0.0}, {0.1, 0.0, 0.0}, 5);
+  s.addRod({0.09, -0.05, 0.01}, {0.09, 0.05, 0.01}, 5);
+  ContactPotential potential = s.potential();
+  potential.begin(s.x, s.solids, 0.01);
+  const auto passes = [&](const Vector& way) {
+    Eigen::Matrix3Xd x = s.x;
+    x.rightCols(6).colwise() += way;
+    return potential.passedThrough(x, s.solids);
+  };
+  EXPECT_TRUE(passes({0, 0, -0.02}));
+  EXPECT_FALSE(passes({0.025, 0, -0.02}));   // past the end
+  EXPECT_FALSE(passes({0, 0, 0.02}));
+  EXPECT_FALSE(passes({0, 0, -0.0099}));   // too short, and before the other rod
 }
 
 /// If the pieces of a surface are rebuilt, contact still lets pass what presses on their held points.

@@ -269,10 +269,11 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
 
-  /// Returns whether anything would have crossed a cloth if points and the origins of solids had moved straight from
-  /// begin() to their present places. In one long step the iterates of a solution can go around the rim of a cloth
-  /// without touching it. Things that moved less than half of the cloth's shortest edge against it are not examined.
-  bool passedSheet(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
+  /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
+  /// had moved straight from begin() to their present places. In one long step the iterates of a solution can go around
+  /// the rim of a cloth, or the end of a curve, without touching it. Things that moved less than half of the shortest
+  /// edge of the cloth or curve against it are not examined.
+  bool passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
 
   /// Returns the potential [J] at a configuration, plus the constant of followFriction(). It is infinite where surfaces
   /// meet or x is not finite. Fills terms(), in an order that depends on x and solids only; their stiffness and rows()

@@ -25,8 +25,8 @@ enum class StepFailure
   turned_too_far,
   /// cloth: more work than a step is given; the guide, or what holds it, moves too far at once or presses it too hard
   work_exceeded,
-  passed_sheet,   ///< contact: something may have got to the other side of a cloth; a substep is only cut for it
-  interrupted,    ///< the process was asked to end (interruptSteps()); nothing is wrong with the step
+  passed_through,   ///< contact: something may have got around a rim or an end; a substep is only cut for it
+  interrupted,      ///< the process was asked to end (interruptSteps()); nothing is wrong with the step
 };
 
 /// What one call of step() did. Sums and maxima run over all its substeps.
