@@ -190,6 +190,8 @@ std::vector<FigureMotion> packageMotions()
 
 std::vector<FigureMotion> recordedMotions(const std::string& folder)
 {
+  if (!std::filesystem::is_directory(folder))
+    throw std::runtime_error("SLENDER_MOTIONS: '" + folder + "' is not a folder; give one with motions *.csv.");
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     if (entry.path().extension() == ".csv")
