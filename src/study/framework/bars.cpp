@@ -70,7 +70,7 @@ const std::vector<Bar>& bars()
       {"coupled_momentum", "linear_loss", at_most, 1e-10},   // far above round-off
       {"coupled_momentum", "energy_gain", at_most, 1e-12},   // round-off
       {"coupling_peers", "iterations_over_peer", at_most, 1, result, full},
-      {"coupling_peers", "iterations_ball_20", at_most, 9},   // 7.4; before friction followed its normal forces 9
+      {"coupling_peers", "iterations_ball_20", at_most, 9},   // 5.5; before friction followed its normal forces 9
       {"coupling_peers", "cost_of_range", at_most, 1.5, timing},
       {"coupling_peers", "depth_error", at_most, 0.03, result, full},
       {"garments", "refused", at_most, 0},
