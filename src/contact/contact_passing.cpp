@@ -1,4 +1,4 @@
-// What may have passed through a cloth or a curve although no iterate of a solution touched it.
+// Finds what may have passed through a cloth or a curve although no iterate of a solution touched it.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -26,8 +26,8 @@ void ContactPotential::Impl::takeDisplacements(const Eigen::Matrix3Xd& x_end)
   }
 }
 
-/// Whether anything has moved far against a cloth or a curve since begin(), measured by its shortest edge. What moves
-/// less cannot get from one side to the other without coming near the rim or the end.
+/// Returns whether anything has moved against a cloth or a curve by more than half of the shortest edge there since
+/// begin(). What moves less cannot get to the other side without coming near the rim or the end.
 bool ContactPotential::Impl::movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
 {
   constexpr double kFar = 0.5;   // of the shortest edge

@@ -350,7 +350,6 @@ double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<
 void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h)
 {
   impl_->lagged.clear();
-  impl_->beginFollowing();
   impl_->x_begin = x;
   impl_->solids_begin = solids;
   impl_->h = h;
@@ -358,6 +357,7 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   for (BarrierStiffness& own : impl_->stiffness)
     own.beginStep();
   impl_->lagFriction();
+  impl_->beginFollowing();   // The change from no friction at all tells nothing of alternation.
 }
 
 void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids,

@@ -200,8 +200,8 @@ private:
   std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
   std::vector<PredictedForce> predicted_;   ///< if friction follows: one per contact, in their order
   int follows_left_ = 0;                    ///< how often friction may still follow before the next begin()
-  /// Result of the last lagFriction() without prediction, and the share of the changes of forces that the next one
-  /// takes over.
+  /// The change that lagFriction() without prediction returned last, and the share of the change of each force that
+  /// the next call takes over.
   double last_change_ = kInfinity, relaxation_ = 1.0;
   double shift_ = 0.0;   ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;

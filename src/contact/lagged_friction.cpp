@@ -264,7 +264,7 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
 /// friction takes over only a part of it from then on.
 void ContactPotential::Impl::relax(double change)
 {
-  constexpr double kHardly = 0.7;   // of the change before; alternation keeps it at 1, convergence at 0.3 or less
+  constexpr double kHardly = 0.7;   // of the change before; where forces alternate, it stays near 1
   constexpr double kLeast = 0.25;
   if (change > kHardly * last_change_)
     relaxation_ = std::max(kLeast, 0.5 * relaxation_);

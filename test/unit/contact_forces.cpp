@@ -366,7 +366,7 @@ TEST(ContactFriction, FollowsPredictedForces)
 }
 
 /// Solutions alternate between a place below and a place above that of the balance, because each of them follows from
-/// the friction before it. The normal forces of friction go to the mean.
+/// the friction before it. Damping brings the normal forces of friction near the mean.
 TEST(ContactFriction, AlternatingForcesAreDamped)
 {
   SegmentOnFloor on_floor;
