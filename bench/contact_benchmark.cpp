@@ -183,7 +183,7 @@ void fclDistance(benchmark::State& state, const FclShape& shape, const ConvexPie
     pose.linear() = Eigen::Quaterniond(u(random), u(random), u(random), u(random)).normalized().toRotationMatrix();
     double a = -0.5 * kLength, b = 0.5 * kLength;
     const auto distance = [&](double t) {
-      return pieceDistance(piece, pose * Eigen::Vector3d(0, 0, t), Eigen::Vector3d::Zero()).distance - kRadius;
+      return pieceDistance(piece, pose * Eigen::Vector3d(0, 0, t)).distance - kRadius;
     };
     for (int k = 0; k < 90; ++k)
     {

@@ -115,7 +115,7 @@ void Candidates::findOnSolid(const ContactSurface& surface, int solid, const Sol
     const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
     if (pieces.tree.empty())
     {
-      if (pieceDistance(pieces.pieces[0], to_solid * middle, Eigen::Vector3d::Zero()).distance <= half + range)
+      if (pieceDistance(pieces.pieces[0], to_solid * middle).distance <= half + range)
         on_solids_.push_back({solid, static_cast<int>(i), 0});
       continue;
     }

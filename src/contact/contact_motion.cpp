@@ -156,7 +156,7 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
         continue;
       for (const ConvexPiece& piece : solids[k].pieces)
       {
-        const auto distance = [&](double t) { return pieceDistance(piece, a + t * e, e).distance - s.radius; };
+        const auto distance = [&](double t) { return pieceDistance(piece, a + t * e).distance - s.radius; };
         if (distance(0.5) < 0.5 * e.norm() + least)
           least = std::min(least, convexMinimum(distance));
       }

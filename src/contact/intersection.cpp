@@ -55,6 +55,9 @@ private:
 int orientation2(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c, int axis)
 {
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+  const double left = (a[u] - c[u]) * (b[v] - c[v]), right = (a[v] - c[v]) * (b[u] - c[u]);
+  if (std::abs(left - right) > 1e-15 * (std::abs(left) + std::abs(right)))   // more than all rounding together
+    return left > right ? 1 : -1;
   ExactSum sum;
   const Eigen::Vector3d* p[3] = {&a, &b, &c};
   for (int i = 0; i < 3; ++i)
@@ -114,6 +117,9 @@ int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen:
                                                        std::abs(v.x() * w.y()) + std::abs(v.y() * w.x())));
   if (std::abs(volume) > 2e-15 * size)
     return volume > 0.0 ? 1 : -1;
+  for (int k = 0; k < 3; ++k)
+    if (u[k] == 0.0 && v[k] == 0.0 && w[k] == 0.0)   // differences of equal numbers only: in a plane
+      return 0;
   // |a b c| - |b c d| + |c d a| - |d a b| term by term
   const Eigen::Vector3d* p[4] = {&a, &b, &c, &d};
   ExactSum sum;
@@ -170,7 +176,7 @@ void addFaces(const Eigen::Matrix3Xi& triangles, int first, int object, std::vec
 double segmentDepth(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b)
 {
   const Eigen::Vector3d e = b - a;
-  const auto distance = [&](double t) { return pieceDistance(piece, a + t * e, e).distance; };
+  const auto distance = [&](double t) { return pieceDistance(piece, a + t * e).distance; };
   double low = 0.0, high = 1.0;
   for (int k = 0; k < 60; ++k)
   {

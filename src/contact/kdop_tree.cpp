@@ -38,7 +38,6 @@ void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& gr
 {
   touching_ = touching;
   groups_ = count;
-  group_.clear();
   const int n = static_cast<int>(centers.cols());
   order_.resize(n);
   for (int i = 0; i < n; ++i)
@@ -46,28 +45,21 @@ void KdopTree::build(const Eigen::Matrix3Xd& centers, const std::vector<int>& gr
   // not std::stable_sort(), which takes memory
   std::sort(order_.begin(), order_.end(),
             [&](int i, int j) { return groups[i] != groups[j] ? groups[i] < groups[j] : i < j; });
-  second_.clear();
-  leaves_.clear();
+  nodes_.clear();
   if (n > 0)
     divide(0, n, centers, groups);
-  volumes_.resize(second_.size());
-  active_.resize(second_.size());
+  volumes_.resize(nodes_.size());
 }
 
 void KdopTree::divide(int from, int to, const Eigen::Matrix3Xd& centers, const std::vector<int>& groups)
 {
-  const std::size_t node = second_.size();
-  leaves_.push_back(to - from);
-  group_.push_back(groups[order_[from]] == groups[order_[to - 1]] ? groups[order_[from]] : -1);
+  const int first = groups[order_[from]], last = groups[order_[to - 1]];
+  const std::size_t node = nodes_.size();
+  nodes_.push_back({-1 - order_[from], to - from, first == last ? first : -1, false});
   if (to - from == 1)
-  {
-    second_.push_back(-1 - order_[from]);
     return;
-  }
-  second_.push_back(0);
   const auto begin = order_.begin();
   int middle;
-  const int first = groups[order_[from]], last = groups[order_[to - 1]];
   if (first != last)
   {
     const int group = groups[order_[(from + to) / 2]];
@@ -93,59 +85,65 @@ void KdopTree::divide(int from, int to, const Eigen::Matrix3Xd& centers, const s
     });
   }
   divide(from, middle, centers, groups);
-  second_[node] = static_cast<int>(second_.size());
+  nodes_[node].second = static_cast<int>(nodes_.size());
   divide(middle, to, centers, groups);
 }
 
 void KdopTree::refit(const std::vector<Kdop>& volumes, const std::vector<char>& active)
 {
-  for (int i = static_cast<int>(second_.size()) - 1; i >= 0; --i)
+  for (std::size_t i = nodes_.size(); i-- > 0;)
   {
-    const int second = second_[i];
-    if (second < 0)
+    Node& node = nodes_[i];
+    if (node.second < 0)
     {
-      volumes_[i] = volumes[-1 - second];
-      active_[i] = active[-1 - second];
+      volumes_[i] = volumes[-1 - node.second];
+      node.active = active[-1 - node.second] != 0;
       continue;
     }
     volumes_[i] = volumes_[i + 1];
-    volumes_[i].include(volumes_[second]);
-    active_[i] = active_[i + 1] | active_[second];
+    volumes_[i].include(volumes_[node.second]);
+    node.active = nodes_[i + 1].active || nodes_[node.second].active;
   }
 }
 
 void KdopTree::selfPairs(std::vector<Pair>& pairs, std::size_t most) const
 {
-  if (!second_.empty())
+  if (!nodes_.empty())
     inside(0, pairs, most);
 }
 
-void KdopTree::inside(int node, std::vector<Pair>& pairs, std::size_t most) const
+void KdopTree::inside(int number, std::vector<Pair>& pairs, std::size_t most) const
 {
-  const int second = second_[node];
-  if (second < 0 || !active_[node] || apart(node, node))
+  const Node& node = nodes_[number];
+  if (node.second < 0 || !node.active || apart(node, node))
     return;
-  inside(node + 1, pairs, most);
-  inside(second, pairs, most);
-  if (volumes_[node + 1].overlaps(volumes_[second]))
-    between(node + 1, second, pairs, most);
+  inside(number + 1, pairs, most);
+  inside(node.second, pairs, most);
+  if (volumes_[number + 1].overlaps(volumes_[node.second]))
+    between(number + 1, node.second, pairs, most);
 }
 
 /// Of two nodes that overlap.
 void KdopTree::between(int a, int b, std::vector<Pair>& pairs, std::size_t most) const
 {
-  if (!(active_[a] | active_[b]) || apart(a, b) || pairs.size() > most)
+  const Node &first = nodes_[a], &second = nodes_[b];
+  if (!(first.active || second.active) || apart(first, second) || pairs.size() > most)
     return;
-  if (leaves_[a] == 1 && leaves_[b] == 1)
+  if (first.leaves == 1 && second.leaves == 1)
   {
-    pairs.push_back({-1 - second_[a], -1 - second_[b]});
+    pairs.push_back({-1 - first.second, -1 - second.second});
     return;
   }
-  const bool first = leaves_[a] >= leaves_[b];
-  const int divided = first ? a : b, other = first ? b : a;
-  for (const int child : {divided + 1, second_[divided]})
-    if (volumes_[child].overlaps(volumes_[other]))
-      first ? between(child, other, pairs, most) : between(other, child, pairs, most);
+  if (first.leaves >= second.leaves)
+  {
+    for (const int child : {a + 1, first.second})
+      if (volumes_[child].overlaps(volumes_[b]))
+        between(child, b, pairs, most);
+    return;
+  }
+  for (const int child : {b + 1, second.second})
+    if (volumes_[child].overlaps(volumes_[a]))
+      between(a, child, pairs, most);
 }
 
 }   // namespace slender

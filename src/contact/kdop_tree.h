@@ -24,11 +24,27 @@ struct Kdop
       high[k] = high[k] > b.high[k] ? high[k] : b.high[k];
     }
   }
+  /// By a distance [m] on all sides.
+  void enlarge(float by)
+  {
+    constexpr float kDiagonal = 1.4142137f;   // rounded up
+    const Slabs first = {by, by, by, kDiagonal * by}, second = first[3] + Slabs{};
+    low[0] -= first;
+    high[0] += first;
+    low[1] -= second;
+    high[1] += second;
+  }
   bool overlaps(const Kdop& b) const
   {
     using Words = long long __attribute__((vector_size(16)));
     const auto apart = (low[0] > b.high[0]) | (b.low[0] > high[0]) | (low[1] > b.high[1]) | (b.low[1] > high[1]);
     const Words w = (Words)apart;   // the same bits
+    return !(w[0] | w[1]);
+  }
+  bool contains(const Kdop& b) const
+  {
+    using Words = long long __attribute__((vector_size(16)));
+    const Words w = (Words)((b.low[0] < low[0]) | (b.high[0] > high[0]) | (b.low[1] < low[1]) | (b.high[1] > high[1]));
     return !(w[0] | w[1]);
   }
 };
@@ -60,20 +76,24 @@ private:
   void divide(int from, int to, const Eigen::Matrix3Xd& centers, const std::vector<int>& groups);
   void inside(int node, std::vector<Pair>& pairs, std::size_t most) const;
   void between(int a, int b, std::vector<Pair>& pairs, std::size_t most) const;
-  bool apart(int a, int b) const
+  struct Node
   {
-    return group_[a] >= 0 && group_[b] >= 0 &&
-           !touching_[static_cast<std::size_t>(group_[a]) * groups_ + static_cast<std::size_t>(group_[b])];
+    int second;   ///< second child; of a leaf: -1 - element
+    int leaves;   ///< below the node
+    int group;    ///< -1: several
+    bool active;
+  };
+  bool apart(const Node& a, const Node& b) const
+  {
+    return a.group >= 0 && b.group >= 0 &&
+           !touching_[static_cast<std::size_t>(a.group) * groups_ + static_cast<std::size_t>(b.group)];
   }
 
   std::vector<int> order_;      ///< elements, as the leaves follow each other
-  std::vector<Kdop> volumes_;   ///< nodes in depth-first order: the first child follows its parent
-  std::vector<int> second_;     ///< second child; of a leaf: -1 - element
-  std::vector<int> leaves_;     ///< below a node
-  std::vector<int> group_;      ///< of a node; -1: several
+  std::vector<Node> nodes_;     ///< in depth-first order: the first child follows its parent
+  std::vector<Kdop> volumes_;   ///< of nodes
   std::vector<char> touching_;
   std::size_t groups_ = 0;
-  std::vector<char> active_;
 };
 
 }   // namespace slender

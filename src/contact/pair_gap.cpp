@@ -31,15 +31,16 @@ FacePlace placeAt(const ConvexPiece& piece, const Vector* corner, double thickne
 {
   const Vector p = weights[0] * corner[0] + weights[1] * corner[1] + weights[2] * corner[2];
   const Vector e = corner[1] - corner[0], f = corner[2] - corner[0];
-  const PieceDistance along_e = pieceDistance(piece, p, e);
+  const PieceDistance from = pieceDistance(piece, p);
+  const Vector bend = from.curvature * f;
   FacePlace at;
   at.weights = weights;
-  at.gap = along_e.distance - thickness;
+  at.gap = from.distance - thickness;
   at.phi = 1.0 - softness * (1.5 * weights.squaredNorm() - 0.5);
-  at.normal = along_e.normal;
-  at.c00 = along_e.curvature;
-  at.c11 = pieceDistance(piece, p, f).curvature;
-  at.c01 = 0.5 * (pieceDistance(piece, p, e + f).curvature - at.c00 - at.c11);
+  at.normal = from.normal;
+  at.c00 = std::max(0.0, e.dot(from.curvature * e));   // without the negative rest of rounding
+  at.c01 = e.dot(bend);
+  at.c11 = std::max(0.0, f.dot(bend));
   for (int k = 0; k < 3; ++k)
     at.slopes[k] = at.normal.dot(corner[k] - p);
   return at;
@@ -263,7 +264,7 @@ PairGap facePieceGap(const Vector* corner, int corners, double thickness, const 
     return trianglePieceGap(corner, thickness, piece);
   if (corners == 2)
     return segmentPieceGap(corner, thickness, piece);
-  const PieceDistance at = pieceDistance(piece, corner[0], Vector::Zero());
+  const PieceDistance at = pieceDistance(piece, corner[0]);
   PairGap out;
   out.distance = at.distance;
   out.gap = at.distance - thickness;
@@ -277,7 +278,7 @@ double leastFaceDistance(const ConvexPiece& piece, const Vector* corner, int cor
   Vector middle = Vector::Zero();
   for (int k = 0; k < corners; ++k)
     middle += corner[k] / corners;
-  const PieceDistance at = pieceDistance(piece, middle, Vector::Zero());
+  const PieceDistance at = pieceDistance(piece, middle);
   double least = 0.0;
   for (int k = 0; k < corners; ++k)
     least = std::min(least, at.normal.dot(corner[k] - middle));
@@ -304,7 +305,7 @@ FacePlane separatingPlane(const ConvexPiece& piece, const Vector* corner, int co
   }
   else
   {
-    const PieceDistance at = pieceDistance(piece, place, Vector::Zero());
+    const PieceDistance at = pieceDistance(piece, place);
     out.distance = at.distance;
     out.normal = at.normal;
   }

@@ -1,7 +1,8 @@
 #include "sheet_candidates.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <iterator>
 
 #include "slender_sim/contact/distance.h"
 #include "pair_gap.h"
@@ -12,6 +13,13 @@ namespace {
 
 const double kCorner = std::sqrt(3.0);   // of a cube, from its middle, over half its side
 constexpr double kMet = 1e-6;            // of thickness and gap: pieces that are nearer at rest are neighbours
+
+/// Two pieces in one number, in the order of pairs. Those of points and triangles are behind kPoints.
+using Key = std::uint64_t;
+constexpr Key kPoints = Key{1} << 62;
+Key keyOf(int first, int second) { return (static_cast<Key>(first) << 31) + static_cast<Key>(second); }
+int firstOf(Key key) { return static_cast<int>(key % kPoints >> 31); }
+int secondOf(Key key) { return static_cast<int>(key % (Key{1} << 31)); }
 
 /// Thickness and scale of a pair, by the distance that `distance` gives at points. False: they are neighbours.
 template <class Distance>
@@ -28,6 +36,21 @@ bool fitToRest(const ContactSurface& surface, int a, int b, double gap, Distance
   return pair.scale > kMet;
 }
 
+Kdop volume(const std::vector<Kdop>& points, const SheetPieces::Edge& edge)
+{
+  Kdop out = points[edge.a];
+  out.include(points[edge.b]);
+  return out;
+}
+
+Kdop volume(const std::vector<Kdop>& points, const std::array<int, 3>& corner)
+{
+  Kdop out = points[corner[0]];
+  out.include(points[corner[1]]);
+  out.include(points[corner[2]]);
+  return out;
+}
+
 }   // namespace
 
 void SheetCandidates::build(const ContactSurface& surface, const SheetPieces& pieces,
@@ -37,15 +60,16 @@ void SheetCandidates::build(const ContactSurface& surface, const SheetPieces& pi
   on_solids_.clear();
   gap_ = slack.gap;
   findPairs(surface, pieces, motion, slack);
+  const std::vector<SheetPieces::Face>* lists[3] = {&pieces.corners, &pieces.whole, &pieces.faces};
+  for (auto& balls : balls_)
+    balls.clear();
   for (std::size_t k = 0; k < solids.size(); ++k)
   {
     const ContactSolid& solid = surface.solids[k];
-    const bool plane = std::holds_alternative<Plane>(solid.shape);
-    findOnSolid(surface,
-                plane        ? pieces.corners
-                : solid.body ? pieces.whole
-                             : pieces.faces,
-                static_cast<int>(k), solids[k], motion, slack);
+    const int list = std::holds_alternative<Plane>(solid.shape) ? 0 : solid.body ? 1 : 2;
+    if (balls_[list].empty())
+      setBalls(*lists[list], motion, slack.margin, balls_[list]);
+    findOnSolid(surface, *lists[list], balls_[list], static_cast<int>(k), solids[k], motion, slack);
   }
 }
 
@@ -70,9 +94,27 @@ void SheetCandidates::buildTree(const ContactSurface& surface, const SheetPieces
     centers_.col(i) = (x.col(e.corner[0]) + x.col(e.corner[1]) + x.col(e.corner[2])) / 3.0;
   }
   tree_.build(centers_, groups_, touching_, objects);
+  skin_.resize(objects);
+  edge_counts_.resize(objects);
+  setSkins(pieces, x);
   volumes_.resize(count);
-  active_.assign(count, 1);
+  active_.resize(count);
+  known_.clear();
   tree_built_ = true;
+}
+
+void SheetCandidates::setSkins(const SheetPieces& pieces, const Eigen::Matrix3Xd& x)
+{
+  constexpr double kSkin = 0.1;   // of the mean edge: half and double take 2 to 10 % more time
+  std::fill(skin_.begin(), skin_.end(), 0.0);
+  std::fill(edge_counts_.begin(), edge_counts_.end(), 0);
+  for (const SheetPieces::Edge& e : pieces.edges)
+  {
+    skin_[e.object] += kSkin * (x.col(e.b) - x.col(e.a)).norm();
+    ++edge_counts_[e.object];
+  }
+  for (std::size_t k = 0; k < skin_.size(); ++k)
+    skin_[k] /= std::max(1, edge_counts_[k]);
 }
 
 void SheetCandidates::findPairs(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion,
@@ -80,67 +122,126 @@ void SheetCandidates::findPairs(const ContactSurface& surface, const SheetPieces
 {
   if (!tree_built_)
     buildTree(surface, pieces, motion.x);
-  // The volumes are those in a frame that moves with the points on average.
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  setVolumes(pieces, motion, slack);
+  updateNeighbours(surface, pieces);
+  for (const Key key : neighbours_)
+    key < kPoints ? testEdges(surface, pieces, motion.x, firstOf(key), secondOf(key))
+                  : testPoint(surface, pieces, motion.x, firstOf(key), secondOf(key));
+}
+
+/// Sets the volumes of points in the frame of their mean, and how far they stray from their places in it.
+void SheetCandidates::setVolumes(const SheetPieces& pieces, const SurfaceMotion& motion, const Slack& slack)
+{
+  Eigen::Vector3d begin = Eigen::Vector3d::Zero(), end = begin;
   for (const SheetPieces::Point& p : pieces.points)
-    mean += motion.x_end.col(p.point) - motion.x.col(p.point);
-  mean /= static_cast<double>(pieces.points.size());
+  {
+    begin += motion.x.col(p.point);
+    end += motion.x_end.col(p.point);
+  }
+  begin /= static_cast<double>(pieces.points.size());
+  end /= static_cast<double>(pieces.points.size());
   const double around = 0.5 * slack.gap + kCorner * slack.margin;
-  points_.resize(static_cast<std::size_t>(surface.points));
-  strays_.resize(static_cast<std::size_t>(surface.points));
+  points_.resize(static_cast<std::size_t>(motion.x.cols()));
+  strays_.resize(points_.size());
   for (const SheetPieces::Point& p : pieces.points)
   {
-    const Eigen::Vector3d end = motion.x_end.col(p.point) - mean;
-    points_[p.point] = Kdop::swept(motion.x.col(p.point).data(), end.data(), p.radius + around);
-    strays_[p.point] = (end - motion.x.col(p.point)).norm() + around;
+    const Eigen::Vector3d from = motion.x.col(p.point) - begin, to = motion.x_end.col(p.point) - end;
+    points_[p.point] = Kdop::swept(from.data(), to.data(), p.radius + around);
+    strays_[p.point] = (to - from).norm() + around;
   }
-  edges_.resize(pieces.edges.size());
-  for (std::size_t i = 0; i < edges_.size(); ++i)
+}
+
+/// Finds the neighbours of points that have left their skins.
+void SheetCandidates::updateNeighbours(const ContactSurface& surface, const SheetPieces& pieces)
+{
+  constexpr double kMany = 0.5;   // of the points: if more have left, the list begins anew
+  left_.assign(points_.size(), 0);
+  std::size_t count = 0;
+  for (const SheetPieces::Point& p : pieces.points)
+    if (known_.empty() || !known_[p.point].contains(points_[p.point]))
+    {
+      left_[p.point] = 1;
+      ++count;
+    }
+  if (count == 0)
+    return;
+  if (static_cast<double>(count) > kMany * static_cast<double>(pieces.points.size()) ||
+      neighbours_.size() > most_neighbours_)
   {
-    edges_[i] = points_[pieces.edges[i].a];
-    edges_[i].include(points_[pieces.edges[i].b]);
+    left_.assign(points_.size(), 1);
+    neighbours_.clear();
   }
+  const bool anew = neighbours_.empty();
+  known_.resize(points_.size());
+  for (const SheetPieces::Point& p : pieces.points)
+    if (left_[p.point])
+    {
+      known_[p.point] = points_[p.point];
+      known_[p.point].enlarge(static_cast<float>(skin_[p.object]));
+    }
   for (std::size_t i = 0; i < volumes_.size(); ++i)
   {
     const auto& corner = pieces.elements[i].corner;
-    volumes_[i] = points_[corner[0]];
-    volumes_[i].include(points_[corner[1]]);
-    volumes_[i].include(points_[corner[2]]);
+    volumes_[i] = volume(known_, corner);
+    active_[i] = left_[corner[0]] | left_[corner[1]] | left_[corner[2]];
   }
   found_.clear();
+  fresh_.clear();
   tree_.refit(volumes_, active_);
   tree_.selfPairs(found_);
   for (const KdopTree::Pair& p : found_)
-    testElements(surface, pieces, motion.x, p.first, p.second);
-  const auto rank = [](const Pair& p) { return (static_cast<std::int64_t>(p.first) << 32) + p.second; };
-  std::sort(pairs_.begin(), pairs_.end(),
-            [&](const Pair& a, const Pair& b) { return a.edges != b.edges ? a.edges : rank(a) < rank(b); });
+    addNeighbours(surface, pieces, p.first, p.second);
+  std::sort(fresh_.begin(), fresh_.end());
+  merged_.clear();
+  std::set_union(neighbours_.begin(), neighbours_.end(), fresh_.begin(), fresh_.end(), std::back_inserter(merged_));
+  neighbours_.swap(merged_);
+  if (anew)
+    most_neighbours_ = 2 * neighbours_.size() + pieces.points.size();
 }
 
-void SheetCandidates::testElements(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
-                                   int a, int b)
+/// Of two elements.
+void SheetCandidates::addNeighbours(const ContactSurface& surface, const SheetPieces& pieces, int a, int b)
 {
   const SheetPieces::Element &e = pieces.elements[a], &f = pieces.elements[b];
   for (const int i : e.edge)
     for (const int j : f.edge)
       if (i >= 0 && j >= 0)
-        testEdges(surface, pieces, x, std::min(i, j), std::max(i, j));
+        addEdges(pieces, std::min(i, j), std::max(i, j));
   for (int k = 0; k < 3; ++k)
   {
     if (e.point[k] >= 0 && f.corners == 3)
-      testPoint(surface, pieces, x, e.point[k], b);
+      addPoint(surface, pieces, e.point[k], b);
     if (f.point[k] >= 0 && e.corners == 3)
-      testPoint(surface, pieces, x, f.point[k], a);
+      addPoint(surface, pieces, f.point[k], a);
   }
+}
+
+void SheetCandidates::addEdges(const SheetPieces& pieces, int a, int b)
+{
+  const SheetPieces::Edge &e = pieces.edges[a], &f = pieces.edges[b];
+  if (e.a == f.a || e.a == f.b || e.b == f.a || e.b == f.b || (e.driven && f.driven))
+    return;
+  if (volume(known_, e).overlaps(volume(known_, f)))
+    fresh_.push_back(keyOf(a, b));
+}
+
+void SheetCandidates::addPoint(const ContactSurface& surface, const SheetPieces& pieces, int number, int element)
+{
+  const SheetPieces::Point& p = pieces.points[number];
+  const int triangle = pieces.triangleOf(element);
+  const ContactTriangle& t = surface.triangles[triangle];
+  const auto& c = t.corner;
+  if (p.point == c[0] || p.point == c[1] || p.point == c[2] || (p.driven && t.driven == 7))
+    return;
+  if (known_[p.point].overlaps(volumes_[element]))
+    fresh_.push_back(kPoints + keyOf(number, triangle));
 }
 
 void SheetCandidates::testEdges(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
                                 int a, int b)
 {
-  if (!edges_[a].overlaps(edges_[b]))
-    return;
   const SheetPieces::Edge &e = pieces.edges[a], &f = pieces.edges[b];
-  if (e.a == f.a || e.a == f.b || e.b == f.a || e.b == f.b || (e.driven && f.driven))
+  if (!volume(points_, e).overlaps(volume(points_, f)))
     return;
   const auto distance = [&](const Eigen::Matrix3Xd& y, int first) {
     return segmentDistance(y.col(e.a - first), y.col(e.b - first), y.col(f.a - first), y.col(f.b - first));
@@ -152,15 +253,12 @@ void SheetCandidates::testEdges(const ContactSurface& surface, const SheetPieces
 }
 
 void SheetCandidates::testPoint(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x,
-                                int number, int element)
+                                int number, int triangle)
 {
   const SheetPieces::Point& p = pieces.points[number];
-  if (!points_[p.point].overlaps(volumes_[element]))
-    return;
-  const int triangle = pieces.triangleOf(element);
   const ContactTriangle& t = surface.triangles[triangle];
   const auto& c = t.corner;
-  if (p.point == c[0] || p.point == c[1] || p.point == c[2] || (p.driven && t.driven == 7))
+  if (!points_[p.point].overlaps(volume(points_, c)))
     return;
   const auto distance = [&](const Eigen::Matrix3Xd& y, int first) {
     return pointTriangleDistance(y.col(p.point - first), y.col(c[0] - first), y.col(c[1] - first), y.col(c[2] - first));
@@ -171,35 +269,52 @@ void SheetCandidates::testPoint(const ContactSurface& surface, const SheetPieces
     pairs_.push_back(pair);
 }
 
-void SheetCandidates::findOnSolid(const ContactSurface& surface, const std::vector<SheetPieces::Face>& faces, int solid,
-                                  const SolidPieces& pieces, const SurfaceMotion& motion, const Slack& slack)
+/// Balls in which faces remain while points stay near their motions.
+void SheetCandidates::setBalls(const std::vector<SheetPieces::Face>& faces, const SurfaceMotion& motion, double margin,
+                               std::vector<Ball>& balls)
+{
+  for (const SheetPieces::Face& face : faces)
+  {
+    Ball ball{Eigen::Vector3d::Zero(), 0.0, 0.0};
+    for (int k = 0; k < face.corners; ++k)
+    {
+      const int i = face.corner[k];
+      ball.middle += motion.x.col(i) / face.corners;
+      ball.moved = std::max(ball.moved, (motion.x_end.col(i) - motion.x.col(i)).squaredNorm());
+    }
+    for (int k = 0; k < face.corners; ++k)
+      ball.half = std::max(ball.half, (motion.x.col(face.corner[k]) - ball.middle).squaredNorm());
+    ball.moved = std::sqrt(ball.moved) + kCorner * margin;
+    ball.half = std::sqrt(ball.half);
+    balls.push_back(ball);
+  }
+}
+
+void SheetCandidates::findOnSolid(const ContactSurface& surface, const std::vector<SheetPieces::Face>& faces,
+                                  const std::vector<Ball>& balls, int solid, const SolidPieces& pieces,
+                                  const SurfaceMotion& motion, const Slack& slack)
 {
   const Pose& pose = motion.solids[solid];
   const ContactSolid& properties = surface.solids[solid];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
   const double reach = pieces.reach, shift = slack.shift[solid], turn = slack.turn[solid];
-  for (const SheetPieces::Face& face : faces)
+  for (std::size_t f = 0; f < faces.size(); ++f)
   {
-    Eigen::Vector3d z[3], middle = Eigen::Vector3d::Zero();
-    double moved2 = 0.0, farthest2 = 0.0, half2 = 0.0;
-    for (int k = 0; k < face.corners; ++k)
-    {
-      const int i = face.corner[k];
-      z[k] = motion.x.col(i) - pose.position;
-      moved2 = std::max(moved2, (motion.x_end.col(i) - motion.x.col(i)).squaredNorm());
-      farthest2 = std::max(farthest2, z[k].squaredNorm());
-      middle += z[k] / face.corners;
-    }
-    for (int k = 0; k < face.corners; ++k)
-      half2 = std::max(half2, (z[k] - middle).squaredNorm());
+    const SheetPieces::Face& face = faces[f];
+    const Ball& ball = balls[f];
     // how far a point of the face may come nearer, seen from the solid
-    const double moved = std::sqrt(moved2) + kCorner * slack.margin;
-    const double range = slack.gap + face.radius + moved + shift + turn * (std::sqrt(farthest2) + moved + shift);
-    if (middle.norm() > reach + std::sqrt(half2) + range || !mayTouch(surface, face.object, properties) ||
+    const double far2 = (ball.middle - pose.position).squaredNorm(), nearer = ball.moved + shift,
+                 still = slack.gap + face.radius + nearer + turn * (ball.half + nearer),
+                 near = reach + ball.half + still;
+    if ((1.0 - turn) * (1.0 - turn) * far2 > near * near && turn < 1.0)
+      continue;
+    const double range = still + turn * std::sqrt(far2);
+    if (!mayTouch(surface, face.object, properties) ||
         passesThrough(surface, face.object, face.corner.data(), face.corners, properties))
       continue;
+    Eigen::Vector3d z[3];
     for (int k = 0; k < face.corners; ++k)
-      z[k] = to_solid * z[k];
+      z[k] = to_solid * (motion.x.col(face.corner[k]) - pose.position);
     const auto add = [&](int piece) {
       if (leastFaceDistance(pieces.pieces[piece], z, face.corners) <= range)
         on_solids_.push_back({solid, piece, face});

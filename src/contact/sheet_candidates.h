@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "kdop_tree.h"
@@ -10,9 +11,11 @@ namespace slender {
 
 /// What may touch of triangles while points and solids stay near a motion. Memory is reused.
 ///
-/// Pairs of triangles, and of triangles and segments, are found by a tree of k-DOPs over them. Of what the tree finds,
-/// the pairs of edges, and of points and triangles, that are too far apart for their motion against the mean are
-/// dropped. So a cloth that is flat has hardly any, however fast it moves as a whole.
+/// A tree of k-DOPs over triangles and segments finds pairs of edges, and of points and triangles, that are neighbours:
+/// their volumes overlap with a skin around the points, seen from the points' mean. The list of neighbours holds while
+/// points stay within their skins [Verlet 1967], and for points that leave them, the tree finds their new neighbours.
+/// Of the neighbours, those that are too far apart for a motion are left out, so that the pairs do not depend on
+/// motions before.
 class SheetCandidates
 {
 public:
@@ -48,15 +51,29 @@ public:
   const std::vector<OnSolid>& onSolids() const { return on_solids_; }
 
 private:
+  /// Around a face.
+  struct Ball
+  {
+    Eigen::Vector3d middle;
+    double half, moved;   ///< its radius where the motion begins, and how far a corner moves [m]
+  };
   void buildTree(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
+  void setSkins(const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
   void findPairs(const ContactSurface& surface, const SheetPieces& pieces, const SurfaceMotion& motion,
                  const Slack& slack);
-  void testElements(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int a, int b);
+  void setVolumes(const SheetPieces& pieces, const SurfaceMotion& motion, const Slack& slack);
+  void updateNeighbours(const ContactSurface& surface, const SheetPieces& pieces);
+  void addNeighbours(const ContactSurface& surface, const SheetPieces& pieces, int a, int b);
+  void addEdges(const SheetPieces& pieces, int a, int b);
+  void addPoint(const ContactSurface& surface, const SheetPieces& pieces, int number, int element);
   void testEdges(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int a, int b);
   void testPoint(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x, int number,
-                 int element);
-  void findOnSolid(const ContactSurface& surface, const std::vector<SheetPieces::Face>& faces, int solid,
-                   const SolidPieces& pieces, const SurfaceMotion& motion, const Slack& slack);
+                 int triangle);
+  static void setBalls(const std::vector<SheetPieces::Face>& faces, const SurfaceMotion& motion, double margin,
+                       std::vector<Ball>& balls);
+  void findOnSolid(const ContactSurface& surface, const std::vector<SheetPieces::Face>& faces,
+                   const std::vector<Ball>& balls, int solid, const SolidPieces& pieces, const SurfaceMotion& motion,
+                   const Slack& slack);
 
   bool tree_built_ = false;
   double gap_ = 0.0;
@@ -64,11 +81,20 @@ private:
   Eigen::Matrix3Xd centers_;
   std::vector<int> groups_;
   std::vector<char> touching_, active_;
-  std::vector<Kdop> volumes_, points_, edges_;   ///< of elements, points and edges
+  std::vector<double> skin_;   ///< per object [m]
+  std::vector<int> edge_counts_;
   std::vector<double> strays_;   ///< of points: how far they get from where the mean motion takes them, and the margin
+  std::vector<Kdop> points_;     ///< volumes of points during the motion, in the frame of their mean
+  std::vector<Kdop> known_;      ///< the same with skins, when the neighbours of a point were sought; or empty
+  std::vector<Kdop> volumes_;    ///< of elements, around those in known_
+  std::vector<char> left_;       ///< points that are not within their volumes in known_
+  std::vector<std::uint64_t> neighbours_;       ///< pairs as numbers, in the order of pairs()
+  std::vector<std::uint64_t> fresh_, merged_;   ///< for updateNeighbours()
+  std::size_t most_neighbours_ = 0;             ///< The list begins anew if it is longer.
   std::vector<KdopTree::Pair> found_;
   std::vector<Pair> pairs_;
   std::vector<OnSolid> on_solids_;
+  std::vector<Ball> balls_[3];   ///< of corners, whole triangles and faces, see SheetPieces
   std::vector<int> triangles_;
 };
 

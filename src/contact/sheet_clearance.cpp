@@ -131,9 +131,7 @@ private:
 /// Smallest distance of a face of 1 to 3 corners from a convex piece, by nested searches.
 double faceDistance(const ConvexPiece& piece, const Eigen::Vector3d* z, int corners)
 {
-  const auto distance = [&](const Eigen::Vector3d& p) {
-    return pieceDistance(piece, p, Eigen::Vector3d::Zero()).distance;
-  };
+  const auto distance = [&](const Eigen::Vector3d& p) { return pieceDistance(piece, p).distance; };
   if (corners == 1)
     return distance(z[0]);
   return convexMinimum([&](double s) {
@@ -188,7 +186,7 @@ double ContactPotential::Impl::sheetClearance(const Eigen::Matrix3Xd& x, const s
       if (middle.norm() > boundingRadius(solid.shape) + options.gap + t.radius + extent)
         continue;
       for (const ConvexPiece& piece : solids[k].pieces)
-        if (pieceDistance(piece, middle, Eigen::Vector3d::Zero()).distance - extent - t.radius < least)
+        if (pieceDistance(piece, middle).distance - extent - t.radius < least)
           least = std::min(least, faceDistance(piece, z, corners) - t.radius);
     }
   return least;

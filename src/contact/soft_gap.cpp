@@ -34,14 +34,14 @@ AlongSegment along(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eig
 {
   AlongSegment at;
   at.t = t;
-  at.piece = pieceDistance(piece, a + t * e, e);
+  at.piece = pieceDistance(piece, a + t * e);
   at.gap = at.piece.distance - radius;
   const EndWeight q(softness, t);
   const double rise = at.piece.normal.dot(e);
   at.weight = q.value;
   at.weight_t = q.first;
   at.slope = q.value * rise + q.first * at.gap;
-  at.curvature = q.value * at.piece.curvature + 2.0 * q.first * rise + q.second * at.gap;
+  at.curvature = q.value * std::max(0.0, e.dot(at.piece.curvature * e)) + 2.0 * q.first * rise + q.second * at.gap;
   return at;
 }
 
@@ -229,7 +229,7 @@ SoftGap gapAt(const TwoSegments& segments, const OnSegments& p, bool free_s, boo
 
 double leastDistance(const ConvexPiece& piece, const Eigen::Vector3d& a, const Eigen::Vector3d& b)
 {
-  const PieceDistance middle = pieceDistance(piece, 0.5 * (a + b), Eigen::Vector3d::Zero());
+  const PieceDistance middle = pieceDistance(piece, 0.5 * (a + b));
   return middle.distance > 0.0 ? std::max(0.0, middle.distance - 0.5 * std::abs(middle.normal.dot(b - a))) : 0.0;
 }
 

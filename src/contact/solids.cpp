@@ -13,87 +13,83 @@ namespace slender {
 
 namespace {
 
-/// Distance from the nearest point of a feature, e.g. the centre of a sphere.
-PieceDistance fromPoint(const Eigen::Vector3d& offset, double radius, const Eigen::Vector3d& e, double along_feature2)
+using Vector = Eigen::Vector3d;
+
+/// Distance from the nearest point of a feature, e.g. the centre of a sphere. `across` projects on the directions in
+/// which that point stays where it is.
+PieceDistance fromPoint(const Vector& offset, double radius, const Eigen::Matrix3d& across)
 {
   const double d = offset.norm();
   PieceDistance out;
   out.distance = d - radius;
-  out.normal = d > 0.0 ? Eigen::Vector3d(offset / d) : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-  const double across = out.normal.dot(e);
-  out.curvature = d > 0.0 ? std::max(0.0, e.squaredNorm() - along_feature2 - across * across) / d : 0.0;
+  out.normal = d > 0.0 ? Vector(offset / d) : Vector(Vector::UnitZ());
+  if (d > 0.0)
+    out.curvature = (across - out.normal * out.normal.transpose()) / d;
   return out;
 }
 
-PieceDistance of(const Plane&, const Eigen::Vector3d& p, const Eigen::Vector3d&)
-{
-  return {p.z(), Eigen::Vector3d::UnitZ(), 0.0};
-}
+PieceDistance of(const Plane&, const Vector& p) { return {p.z(), Vector::UnitZ()}; }
 
-PieceDistance of(const Sphere& s, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
-{
-  return fromPoint(p, s.radius, e, 0.0);
-}
+PieceDistance of(const Sphere& s, const Vector& p) { return fromPoint(p, s.radius, Eigen::Matrix3d::Identity()); }
 
-PieceDistance of(const Capsule& c, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+PieceDistance of(const Capsule& c, const Vector& p)
 {
   const double z = std::min(std::max(p.z(), -0.5 * c.length), 0.5 * c.length);
-  return fromPoint({p.x(), p.y(), p.z() - z}, c.radius, e, z == p.z() ? e.z() * e.z() : 0.0);
+  return fromPoint({p.x(), p.y(), p.z() - z}, c.radius, Vector(1.0, 1.0, z == p.z() ? 0.0 : 1.0).asDiagonal());
 }
 
-PieceDistance of(const Box& b, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+PieceDistance of(const Box& b, const Vector& p)
 {
-  const Eigen::Vector3d beyond = p.cwiseAbs() - 0.5 * b.size;
+  const Vector beyond = p.cwiseAbs() - 0.5 * b.size;
   if ((beyond.array() > 0.0).any())
   {
-    Eigen::Vector3d offset;
-    double along2 = 0.0;
+    Vector offset, across;
     for (int k = 0; k < 3; ++k)
     {
       offset[k] = beyond[k] > 0.0 ? std::copysign(beyond[k], p[k]) : 0.0;
-      along2 += beyond[k] > 0.0 ? 0.0 : e[k] * e[k];
+      across[k] = beyond[k] > 0.0 ? 1.0 : 0.0;
     }
-    return fromPoint(offset, 0.0, e, along2);
+    return fromPoint(offset, 0.0, across.asDiagonal());
   }
   int k;
   const double d = beyond.maxCoeff(&k);
-  return {d, std::copysign(1.0, p[k]) * Eigen::Vector3d::Unit(k), 0.0};
+  return {d, std::copysign(1.0, p[k]) * Vector::Unit(k)};
 }
 
-PieceDistance of(const Cylinder& c, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+PieceDistance of(const Cylinder& c, const Vector& p)
 {
   const double rho = std::hypot(p.x(), p.y()), side = rho - c.radius, end = std::abs(p.z()) - 0.5 * c.length;
-  const Eigen::Vector3d radial =
-      rho > 0.0 ? Eigen::Vector3d(p.x() / rho, p.y() / rho, 0.0) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
-  const Eigen::Vector3d axial = std::copysign(1.0, p.z()) * Eigen::Vector3d::UnitZ();
-  const double around = radial.x() * e.y() - radial.y() * e.x();
+  const Vector radial = rho > 0.0 ? Vector(p.x() / rho, p.y() / rho, 0.0) : Vector(Vector::UnitX());
+  const Vector axial = std::copysign(1.0, p.z()) * Vector::UnitZ(), around(-radial.y(), radial.x(), 0.0);
   if (side > 0.0 && end > 0.0)   // the rim: a circle, whose meridian sections are points
   {
-    const double d = std::hypot(side, end), meridian = (radial.dot(e) * end - axial.dot(e) * side) / d;
-    return {d, (side * radial + end * axial) / d, meridian * meridian / d + around * around * side / (rho * d)};
+    const double d = std::hypot(side, end);
+    const Vector meridian = (end * radial - side * axial) / d;
+    return {d, (side * radial + end * axial) / d,
+            meridian * meridian.transpose() / d + around * around.transpose() * (side / (rho * d))};
   }
   if (side > end)
-    return {side, radial, rho > 0.0 ? around * around / rho : 0.0};
-  return {end, axial, 0.0};
+    return {side, radial, around * around.transpose() * (rho > 0.0 ? 1.0 / rho : 0.0)};
+  return {end, axial};
 }
 
-PieceDistance of(const Triangle& t, const Eigen::Vector3d& p, const Eigen::Vector3d& e)
+PieceDistance of(const Triangle& t, const Vector& p)
 {
-  const Eigen::Vector3d w = closestOnTriangle(p, t[0], t[1], t[2]);
+  const Vector w = closestOnTriangle(p, t[0], t[1], t[2]);
   const int corners = (w.array() > 0.0).count();
-  double along2 = 0.0;
+  Eigen::Matrix3d across = Eigen::Matrix3d::Identity();
   if (corners == 3)
   {
-    const Eigen::Vector3d n = (t[1] - t[0]).cross(t[2] - t[0]);
-    along2 = e.squaredNorm() - std::pow(n.dot(e), 2) / n.squaredNorm();
+    const Vector n = (t[1] - t[0]).cross(t[2] - t[0]);
+    across = n * n.transpose() / n.squaredNorm();
   }
   else if (corners == 2)
   {
     const int absent = w[0] > 0.0 ? (w[1] > 0.0 ? 2 : 1) : 0;
-    const Eigen::Vector3d edge = t[(absent + 2) % 3] - t[(absent + 1) % 3];
-    along2 = std::pow(edge.dot(e), 2) / edge.squaredNorm();
+    const Vector edge = t[(absent + 2) % 3] - t[(absent + 1) % 3];
+    across -= edge * edge.transpose() / edge.squaredNorm();
   }
-  return fromPoint(p - w[0] * t[0] - w[1] * t[1] - w[2] * t[2], 0.0, e, along2);
+  return fromPoint(p - w[0] * t[0] - w[1] * t[1] - w[2] * t[2], 0.0, across);
 }
 
 void requirePositive(const char* what, double value)
@@ -104,9 +100,9 @@ void requirePositive(const char* what, double value)
 
 }   // namespace
 
-PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& direction)
+PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p)
 {
-  return std::visit([&](const auto& shape) { return of(shape, p, direction); }, piece);
+  return std::visit([&](const auto& shape) { return of(shape, p); }, piece);
 }
 
 void checkShape(const Shape& shape)
@@ -159,7 +155,7 @@ double distanceToShape(const Shape& shape, const Pose& pose, const Eigen::Vector
   double least = std::numeric_limits<double>::infinity();
   const auto look = [&](const ConvexPiece& piece) {
     for (int k = 0; k <= places; ++k)
-      least = std::min(least, pieceDistance(piece, a + e * k / 16, e).distance);
+      least = std::min(least, pieceDistance(piece, a + e * k / 16).distance);
   };
   std::visit(
       [&](const auto& s) {

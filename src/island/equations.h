@@ -162,6 +162,7 @@ private:
   void columnsOf(const ContactRow& contact, bool whole, Part::Columns& row) const;
   void addForce(const ContactTerm& term);
   void assemble(const HessianShift& shift, bool whole);
+  void addTerm(const ContactTerm& term, const ContactRow* rows, int count, bool whole);
   bool factor(const HessianShift& shift);
   bool anyAverages() const;
   void keepAverages();

@@ -285,32 +285,35 @@ void Equations::assemble(const HessianShift& shift, bool whole)
       part->addHessian(matrix_, shift);
   if (!contact_)
     return;
-  std::array<Part::Columns, 3> rows;
+  // The rows of a term have its points, and follow in the order of terms.
+  const ContactRow* row = contact_->rows().data();
+  const ContactRow* const end = row + contact_->rows().size();
   forTerms([&](const ContactTerm& term) {
-    if (!partOf(term.point[0]).coupled)
-      return;
-    const SharedMatrix::Bases bases = basesOf(term.point);
-    if (!needsRows(bases, term.solid))
-    {
-      term.turns() ? matrix_.addTurningTerm(term, bases, turnsOf(term)) : matrix_.addTerm(term, bases, whole);
-      return;
-    }
-    columnsOf(term, rows);
-    const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
-    matrix_.addRows(rows.data(), 3, stiffness);
+    const ContactRow* const first = row;
+    while (row < end && row - first < SharedMatrix::kMostRows && row->solid == term.solid &&
+           std::equal(row->point, row->point + 4, term.point))
+      ++row;
+    if (partOf(term.point[0]).coupled)
+      addTerm(term, first, static_cast<int>(row - first), whole);
   });
-  for (const ContactRow& row : contact_->rows())
+}
+
+void Equations::addTerm(const ContactTerm& term, const ContactRow* rows, int count, bool whole)
+{
+  const SharedMatrix::Bases bases = basesOf(term.point);
+  if (!needsRows(bases, term.solid))
   {
-    if (!partOf(row.point[0]).coupled)
-      continue;
-    const SharedMatrix::Bases bases = basesOf(row.point);
-    if (!needsRows(bases, row.solid))
-    {
-      matrix_.addRow(row, bases, whole);
-      continue;
-    }
-    columnsOf(row, whole, rows[0]);
-    matrix_.addRows(rows.data(), 1, row.stiffness * Eigen::Matrix3d::Identity());
+    term.turns() ? matrix_.addTurningTerm(term, bases, turnsOf(term))
+                 : matrix_.addTerm(term, rows, count, bases, whole);
+    return;
+  }
+  std::array<Part::Columns, 3> columns;
+  columnsOf(term, columns);
+  matrix_.addRows(columns.data(), 3, whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness);
+  for (int n = 0; n < count; ++n)
+  {
+    columnsOf(rows[n], whole, columns[0]);
+    matrix_.addRows(columns.data(), 1, rows[n].stiffness * Eigen::Matrix3d::Identity());
   }
 }
 

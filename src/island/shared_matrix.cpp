@@ -62,19 +62,27 @@ void SharedMatrix::notePairs(const Columns& a, const Columns& b)
 void SharedMatrix::merge(const Columns* rows, int count, MergedRows& merged)
 {
   merged.count = 0;
-  const auto end = [&] { return merged.unknown.begin() + merged.count; };
   for (int r = 0; r < count; ++r)
     for (int i = 0; i < rows[r].count; ++i)
-      if (std::find(merged.unknown.begin(), end(), rows[r].index[i]) == end())
-        merged.unknown[merged.count++] = rows[r].index[i];
-  std::sort(merged.unknown.begin(), end());
-  std::fill_n(merged.weight.begin(), merged.count, Eigen::Vector3d(0, 0, 0));
-  for (int r = 0; r < count; ++r)
-    for (int i = 0; i < rows[r].count; ++i)
-    {
-      const auto at = std::lower_bound(merged.unknown.begin(), end(), rows[r].index[i]);
-      merged.weight[at - merged.unknown.begin()][r] += rows[r].value[i];
-    }
+      merged.place(rows[r].index[i])[r] += rows[r].value[i];
+}
+
+/// The weights of an unknown, which are zero if it is new.
+Eigen::Vector3d& SharedMatrix::MergedRows::place(int wanted)
+{
+  int at = count;
+  while (at > 0 && unknown[at - 1] > wanted)
+    --at;
+  if (at > 0 && unknown[at - 1] == wanted)
+    return weight[at - 1];
+  for (int k = count++; k > at; --k)
+  {
+    unknown[k] = unknown[k - 1];
+    weight[k] = weight[k - 1];
+  }
+  unknown[at] = wanted;
+  weight[at].setZero();
+  return weight[at];
 }
 
 void SharedMatrix::noteRows(const Columns* rows, int count)
@@ -295,15 +303,19 @@ void SharedMatrix::addRows(const Columns* rows, int count, const Eigen::Matrix3d
 
 void SharedMatrix::addMerged(const MergedRows& merged, const Eigen::Matrix3d& stiffness)
 {
+  const auto& unknown = merged.unknown;
+  const auto follows = [&](int k) { return k > 0 && unknown[k] == unknown[k - 1] + 1; };
+  std::array<int, Columns::kMost> at;   // of the column's entries; neighbouring entries are mostly neighbours there
   for (int j = 0; j < merged.count; ++j)
   {
     const Eigen::Vector3d force = stiffness * merged.weight[j];
-    for (int i = j, at = 0; i < merged.count; ++i)
+    for (int i = j; i < merged.count; ++i)
     {
-      // The entries of unknowns that follow each other do so, too.
-      const bool follows = i > j && merged.unknown[i] == merged.unknown[i - 1] + 1;
-      at = follows ? at + 1 : index(merged.unknown[i], merged.unknown[j]);
-      values_[at] += merged.weight[i].dot(force);
+      at[i] = i == j       ? diagonal(unknown[j])
+              : follows(i) ? at[i - 1] + 1
+              : follows(j) ? inNextColumn(at[i], unknown[i], unknown[j] - 1)
+                           : index(unknown[i], unknown[j]);
+      values_[at[i]] += merged.weight[i].dot(force);
     }
   }
 }
@@ -330,40 +342,31 @@ void SharedMatrix::addBlocks(const Bases& bases, Block&& block)
       }
 }
 
-void SharedMatrix::addTerm(const ContactTerm& term, const Bases& bases, bool whole)
+void SharedMatrix::addTerm(const ContactTerm& term, const ContactRow* rows, int count, const Bases& bases, bool whole)
 {
   const Eigen::Matrix3d stiffness = whole ? Eigen::Matrix3d(term.stiffness + term.geometric) : term.stiffness;
-  addBlocks(bases, [&](int i, int j) { return Eigen::Matrix3d(term.weight[i] * term.weight[j] * stiffness); });
+  Eigen::Vector3d moves[kMostRows][4];
+  for (int n = 0; n < count; ++n)
+    for (int k = 0; k < 4; ++k)
+      moves[n][k] = rows[n].along[k] * rows[n].normal + (whole ? rows[n].across[k] : 0.0) * rows[n].turning;
+  addBlocks(bases, [&](int i, int j) {
+    Eigen::Matrix3d block = term.weight[i] * term.weight[j] * stiffness;
+    for (int n = 0; n < count; ++n)
+      block += rows[n].stiffness * moves[n][i] * moves[n][j].transpose();
+    return block;
+  });
 }
 
 void SharedMatrix::addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns)
 {
   MergedRows merged;
-  const auto put = [&](int unknown, const Eigen::Vector3d& weight) {   // in ascending order
-    int at = merged.count++;
-    for (; at > 0 && merged.unknown[at - 1] > unknown; --at)
-    {
-      merged.unknown[at] = merged.unknown[at - 1];
-      merged.weight[at] = merged.weight[at - 1];
-    }
-    merged.unknown[at] = unknown;
-    merged.weight[at] = weight;
-  };
   for (int p = 0; p < 4; ++p)
     for (int c = 0; c < 3 && bases[p] >= 0; ++c)
-      put(bases[p] + c, term.weight[p] * Eigen::Vector3d::Unit(c));
+      merged.place(bases[p] + c)[c] += term.weight[p];
   for (int k = 0; k < 2; ++k)
     if (turns[k] >= 0)
-      put(turns[k], term.turn[k].column);
+      merged.place(turns[k]) += term.turn[k].column;
   addMerged(merged, term.stiffness);
-}
-
-void SharedMatrix::addRow(const ContactRow& row, const Bases& bases, bool whole)
-{
-  Eigen::Vector3d r[4];
-  for (int k = 0; k < 4; ++k)
-    r[k] = row.along[k] * row.normal + (whole ? row.across[k] : 0.0) * row.turning;
-  addBlocks(bases, [&](int i, int j) { return Eigen::Matrix3d(row.stiffness * r[i] * r[j].transpose()); });
 }
 
 }   // namespace slender

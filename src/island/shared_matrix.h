@@ -90,10 +90,11 @@ public:
   /// J^T K J for at most three rows J, of which noteRows() knows, and their stiffness K.
   void addRows(const Columns* rows, int count, const Eigen::Matrix3d& stiffness);
   /// Contacts of points with these bases, with or without the part of the second derivative that may be negative.
-  void addTerm(const ContactTerm& term, const Bases& bases, bool whole);
-  /// The same for a term that turns segments; `turns`: the unknowns of their turns, negative: none.
+  /// `rows`: at most kMostRows, of the same points.
+  void addTerm(const ContactTerm& term, const ContactRow* rows, int count, const Bases& bases, bool whole);
+  static constexpr int kMostRows = 2;   ///< the parameters of a place of contact
+  /// The same for a term that turns segments and has no rows; `turns`: the unknowns of their turns, negative: none.
   void addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns);
-  void addRow(const ContactRow& row, const Bases& bases, bool whole);
 
   /// Forgets that factorisations with whole second derivatives, or sweeps, have failed.
   void beginStage() { whole_ = swept_ = {}; }
@@ -147,6 +148,7 @@ private:
     int count = 0;
     std::array<int, Columns::kMost> unknown;
     std::array<Eigen::Vector3d, Columns::kMost> weight;
+    Eigen::Vector3d& place(int wanted);
   };
   static void merge(const Columns* rows, int count, MergedRows& merged);
   void addMerged(const MergedRows& merged, const Eigen::Matrix3d& stiffness);

@@ -95,5 +95,29 @@ TEST(MixedCheck, FindsBendsThatClose)
       "self: true", "self: false");
 }
 
+/// A needle passes in one step through two places of a ring, one of which is the segment that closes the ring. The
+/// linking integral of the whole curves is the same before and after. Nothing is near anything after the step.
+TEST(MixedCheck, FindsANeedleThatPassesThroughARing)
+{
+  Simulation scene(parseScene(R"(
+time: {step: 0.005, integrator: implicit_euler}
+gravity: [0, 0, -2400]
+rods:
+  - name: ring
+    closed: true
+    centerline: {polyline: {points: [[-0.05, 0, 0], [0, 0.05, 0], [0.05, 0, 0], [0, -0.05, 0]]}}
+    cross_section: {radius: 0.002}
+    grasps: {held: {edges: [0..3]}}
+  - name: needle
+    centerline: {straight: {from: [-0.2, -0.025, 0.03], to: [0.2, -0.025, 0.03], edges: 8}}
+    cross_section: {radius: 0.002}
+)"));
+  MixedCheck check(scene);
+  EXPECT_TRUE(scene.step(scene.defaultInputs()).ok);
+  const MixedFindings found = check.check(scene);
+  EXPECT_EQ(found.thickness_violations, 0);
+  EXPECT_GT(found.penetrations, 0);
+}
+
 }   // namespace
 }   // namespace slender::study

@@ -57,9 +57,10 @@ struct PartDriver
         matrix.clear();
         part.addHessian(matrix, shift);
         for (const ContactTerm* term : part.own_terms)
-          matrix.addTerm(*term, basesOf(term->point), false);
+          matrix.addTerm(*term, nullptr, 0, basesOf(term->point), false);
+        ContactTerm none;
         for (const ContactRow* row : part.own_rows)
-          matrix.addRow(*row, basesOf(row->point), false);
+          matrix.addTerm(none, row, 1, basesOf(row->point), false);
       });
     part.closeGradient();
     return e;

@@ -155,7 +155,7 @@ TEST(ContinuousCollision, TurningSolidsKeepTheirGap)
         const Pose inverse = motion.at(t).inverse();
         const Vector p = inverse * Vector(a + t * (ma.to - a)), q = inverse * Vector(b + t * (mb.to - b));
         double low = 0.0, high = 1.0;   // ternary search of a convex function
-        const auto d = [&](double s) { return pieceDistance(pieces[shape], p + s * (q - p), q - p).distance; };
+        const auto d = [&](double s) { return pieceDistance(pieces[shape], p + s * (q - p)).distance; };
         for (int i = 0; i < 50; ++i)
         {
           const double u = low + (high - low) / 3, v = high - (high - low) / 3;

@@ -30,7 +30,7 @@ TEST(MassProperties, AgreeWithRandomPoints)
     for (int i = 0; i < kPoints; ++i)
     {
       const Eigen::Vector3d p = random.vector(kHalf);
-      if (pieceDistance(piece, p, Eigen::Vector3d::Zero()).distance > 0.0)
+      if (pieceDistance(piece, p).distance > 0.0)
         continue;
       ++inside;
       moments += p.squaredNorm() * Eigen::Matrix3d::Identity() - p * p.transpose();

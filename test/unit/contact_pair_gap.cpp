@@ -43,8 +43,7 @@ TEST(PairGap, OfATriangleAndASolidIsTheOnlyMinimum)
       drawTriangle(random, k % 4, z);
       const PairGap soft = facePieceGap(z, 3, kThickness, pieces[shape]);
       const auto value = [&](const Vector& w) {
-        const double g =
-            pieceDistance(pieces[shape], w[0] * z[0] + w[1] * z[1] + w[2] * z[2], Vector::Zero()).distance - kThickness;
+        const double g = pieceDistance(pieces[shape], w[0] * z[0] + w[1] * z[1] + w[2] * z[2]).distance - kThickness;
         return g / (1.0 - kPairGapSoftness * (1.5 * w.squaredNorm() - 0.5));
       };
       const Vector place = soft.place.head<3>();
@@ -86,10 +85,8 @@ TEST(PairGap, PlanesSeparateTrianglesFromSolids)
       double distance = 1e9;   // by places of the triangle
       for (int i = 0; i <= 40; ++i)
         for (int j = 0; i + j <= 40; ++j)
-          distance =
-              std::min(distance,
-                       pieceDistance(pieces[shape], z[0] + (i * (z[1] - z[0]) + j * (z[2] - z[0])) / 40, Vector::Zero())
-                           .distance);
+          distance = std::min(
+              distance, pieceDistance(pieces[shape], z[0] + (i * (z[1] - z[0]) + j * (z[2] - z[0])) / 40).distance);
       const FacePlane plane = separatingPlane(pieces[shape], z, 3, kThickness);
       ASSERT_LE(leastFaceDistance(pieces[shape], z, 3), std::max(0.0, distance) + 1e-12);
       if (distance <= kThickness)

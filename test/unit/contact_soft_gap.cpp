@@ -96,8 +96,7 @@ TEST(SoftGap, OfSolidsIsTheOnlyMinimum)
         b = a + 0.4 * random.uniform() * Vector::Unit(k / 3 % 3);
       const SoftGap soft = softGap(a, b, kRadius, piece);
       const auto value = [&](double t) {
-        return (pieceDistance(piece, a + t * (b - a), b - a).distance - kRadius) /
-               (1.0 - kSoftness * std::pow(2 * t - 1, 2));
+        return (pieceDistance(piece, a + t * (b - a)).distance - kRadius) / (1.0 - kSoftness * std::pow(2 * t - 1, 2));
       };
       double least = 1e9;
       for (int i = 0; i <= 400; ++i)

@@ -15,19 +15,19 @@ using Triangle = std::array<Eigen::Vector3d, 3>;
 /// A convex shape in its own frame. Meshes are taken triangle by triangle.
 using ConvexPiece = std::variant<Plane, Sphere, Box, Cylinder, Capsule, Triangle>;
 
-/// Distance from a convex piece along a line through a point. It uses closed formulas. FCL's GJK finds the distance of
+/// Distance of a point from a convex piece. It uses closed formulas. FCL's GJK finds the distance of
 /// a capsule to 1e-10 m, but it takes 2 to 5 us where a whole softened contact takes 0.3 us here, and it does not give
 /// the curvature and the unique place that smooth forces need (see bench/contact_benchmark.cpp). Outside it is once
 /// continuously differentiable and convex in the point.
 struct PieceDistance
 {
-  double distance = 0.0;    ///< [m] negative inside (a triangle has no inside)
-  Eigen::Vector3d normal;   ///< its gradient, unit
-  double curvature = 0.0;   ///< second derivative along `direction` (not normalised)
+  double distance = 0.0;                                 ///< [m] negative inside (a triangle has no inside)
+  Eigen::Vector3d normal;                                ///< its gradient, unit
+  Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();   ///< second derivative [1/m], positive semidefinite
 };
 
-/// p, direction: in the piece's frame [m].
-PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& direction);
+/// p: in the piece's frame [m].
+PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p);
 
 /// Throws std::invalid_argument naming what is wrong with a shape: sizes that are not positive, indices out of range,
 /// no triangles.

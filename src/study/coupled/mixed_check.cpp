@@ -92,28 +92,40 @@ double shapeDistance(const Shape& shape, const Vector3d (&v)[3])
   });
 }
 
-/// Gauss's linking integral of two open polylines, exact segment by segment [Klenin & Langowski 2000]. Where they pass
-/// through each other it jumps by 1.
-double linkingIntegral(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& y)
+/// Gauss's linking integral of two segments, exact [Klenin & Langowski 2000]. Where they pass through each other it
+/// jumps by 1.
+double linkingIntegral(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d)
 {
-  double sum = 0.0;
-  for (Eigen::Index i = 0; i + 1 < x.cols(); ++i)
-    for (Eigen::Index j = 0; j + 1 < y.cols(); ++j)
+  const Vector3d r13 = c - a, r14 = d - a, r23 = c - b, r24 = d - b;
+  const Vector3d n[4] = {r13.cross(r14), r14.cross(r24), r24.cross(r23), r23.cross(r13)};
+  double area = 0.0;
+  for (int k = 0; k < 4; ++k)
+  {
+    const double size = n[k].norm() * n[(k + 1) % 4].norm();
+    if (size > 0.0)
+      area += std::asin(std::clamp(n[k].dot(n[(k + 1) % 4]) / size, -1.0, 1.0));
+  }
+  return std::copysign(area, (d - c).cross(b - a).dot(r13)) / (4.0 * M_PI);
+}
+
+/// The linking integrals of all pairs of two neighbouring segments each: a place where curves pass through each other
+/// is well inside one of them. Sums over whole curves could cancel, e.g. where a needle passes through a ring twice.
+std::vector<double> linkingIntegrals(const Eigen::Matrix3Xd& x, bool x_closed, const Eigen::Matrix3Xd& y, bool y_closed)
+{
+  const Eigen::Index n = x.cols() - !x_closed, m = y.cols() - !y_closed;
+  Eigen::MatrixXd of(n, m);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < m; ++j)
+      of(i, j) = linkingIntegral(x.col(i), x.col((i + 1) % x.cols()), y.col(j), y.col((j + 1) % y.cols()));
+  std::vector<double> sums;
+  for (Eigen::Index i = 0; i < std::max<Eigen::Index>(1, n - !x_closed); ++i)
+    for (Eigen::Index j = 0; j < std::max<Eigen::Index>(1, m - !y_closed); ++j)
     {
-      const Vector3d r13 = y.col(j) - x.col(i), r14 = y.col(j + 1) - x.col(i), r23 = y.col(j) - x.col(i + 1),
-                     r24 = y.col(j + 1) - x.col(i + 1);
-      const Vector3d n[4] = {r13.cross(r14), r14.cross(r24), r24.cross(r23), r23.cross(r13)};
-      double area = 0.0;
-      for (int k = 0; k < 4; ++k)
-      {
-        const double size = n[k].norm() * n[(k + 1) % 4].norm();
-        if (size > 0.0)
-          area += std::asin(std::clamp(n[k].dot(n[(k + 1) % 4]) / size, -1.0, 1.0));
-      }
-      const Vector3d e = x.col(i + 1) - x.col(i), f = y.col(j + 1) - y.col(j);
-      sum += std::copysign(area, f.cross(e).dot(r13)) / (4.0 * M_PI);
+      const Eigen::Index next_i = (i + 1) % n, next_j = (j + 1) % m;
+      sums.push_back(of(i, j) + (n > 1 ? of(next_i, j) : 0.0) + (m > 1 ? of(i, next_j) : 0.0) +
+                     (n > 1 && m > 1 ? of(next_i, next_j) : 0.0));
     }
-  return sum;
+  return sums;
 }
 
 }   // namespace
@@ -362,7 +374,9 @@ void MixedCheck::checkSides(MixedFindings& out)
   for (std::size_t i = 0; i < rods_; ++i)
     for (std::size_t j = i + 1; j < rods_; ++j)
     {
-      now.push_back({4.0 * linkingIntegral(x_[i], x_[j])});   // large: 1, of at most 2
+      now.push_back(linkingIntegrals(x_[i], curves_[i].closed, x_[j], curves_[j].closed));
+      for (double& integral : now.back())
+        integral *= 4.0;   // large: 1, of at most 2 where curves are straight
       pairs.push_back(names_[i] + " and " + names_[j]);
     }
   for (std::size_t c = rods_; c < objects_; ++c)
