@@ -63,7 +63,6 @@ void makeLinks(const Chain& chain, const Motion (&motions)[2], RodConfig rod, co
 /// first and the last are held.
 void generateChain(const YamlCursor& at, const ReadContext& context, Generated& out)
 {
-  const std::size_t before = at.problems().size();
   YamlMap map(at);
   Chain chain;
   map.getName(chain.name, "Name of the chain; its links are NAME_0, NAME_1, ... Without the key: chain.");
@@ -109,12 +108,12 @@ void generateChain(const YamlCursor& at, const ReadContext& context, Generated& 
   map.finish();
   if (chain.up.cross(chain.along).norm() < 1e-6)
     at_up.problem("is along direction; must point away from it");
-  if (at.problems().size() == before && !allowed.holds(chain.spacing))
+  if (map.sound() && !allowed.holds(chain.spacing))
   {
     at.problem("the wire is too thick: its radius " + shortNumber(thickness) +
                " m must be less than a fifth of the links' radius " + shortNumber(chain.radius) + " m");
   }
-  if (at.problems().size() != before || !context.claim(at, (chain.edges + 1.0) * chain.links))
+  if (!map.sound() || !context.claim(at, (chain.edges + 1.0) * chain.links))
     return;
   makeLinks(chain, motions, rod, at, out);
 }

@@ -28,7 +28,6 @@ ObstacleConfig readHead(YamlMap& map, const ReadContext& context)
                "the key: that of the other object.");
   const YamlCursor motion = head_map.get("motion", "How the ball moves. Without the key: it stands.");
   assign(head.motion, readSolidMotion(motion, context, false));
-  head_map.finish();
   if (const auto* table = std::get_if<TableMotion>(&head.motion))
     head.pose = table->poses.evaluate(table->poses.firstTime());
   return head;
@@ -51,7 +50,6 @@ PolylineCurve curled(double length, double radius, double pitch, int edges, cons
 /// nothing touches, whatever their natural curl.
 void generateHair(const YamlCursor& at, const ReadContext& context, Generated& out)
 {
-  const std::size_t before = at.problems().size();
   YamlMap map(at);
   std::string name = "hair";
   int seed = 1, strands = 100, edges = 49;
@@ -87,7 +85,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
   map.finish();
-  if (at.problems().size() != before || !context.claim(at, (edges + 1.0) * strands))
+  if (!map.sound() || !context.claim(at, (edges + 1.0) * strands))
     return;
 
   const double root_distance =

@@ -147,7 +147,6 @@ BodyConfig jointBall(const Branch& branch, const Branch& parent, double density,
 /// rigid ball carries both.
 void generateTree(const YamlCursor& at, const ReadContext& context, int first_rod, Generated& out)
 {
-  const std::size_t before = at.problems().size();
   YamlMap map(at);
   Tree tree = readTree(map, context);
   const TreeShape& shape = tree.shape;
@@ -156,7 +155,7 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
   map.get("seed", seed, Range::closed(0, 1'000'000'000),
           "Seed of the random places and angles of the branches. Without the key: 1.");
   map.finish();
-  if (at.problems().size() != before)
+  if (!map.sound())
     return;
   Dice dice(seed);
   long count = 0, of_level = 1;

@@ -87,7 +87,6 @@ std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadR
   const YamlCursor edge = map.require("edge",
                                       "Edge of the rod that the body holds; a negative index counts from the end. An "
                                       "end edge of an open rod, 0 or -1, means the section at the end node.");
-  map.finish();
   const auto name = at_rod.text();
   if (!name)
     return std::nullopt;
@@ -169,7 +168,6 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
   map.get("welds",
           "Edges of rods that the body holds: they keep the place and the orientation that they have in the body at "
           "the start. Without the key: none.");   // read where the rods are known
-  map.finish();
   return body;
 }
 

@@ -22,7 +22,6 @@ void readPlasticity(const YamlCursor& at, ClothConfig& cloth)
           "the key: 0.");
   map.get("creep_time", cloth.plasticity.creep_time, Range::closed(0, 1e9, "s"),
           "Time in which all but 1/e of what is beyond the yield flows. Without the key: 0, at once.");
-  map.finish();
   if (cloth.bending != BendingModel::hinge)
   {
     at.problem(
@@ -41,7 +40,6 @@ Aerodynamics readAerodynamics(const YamlCursor& at)
           "Drag coefficient C_D; a plate across the flow has about 1.2. Without the key: 0.");
   map.get("lift", air.lift, Range::closed(0, 1e3),
           "Lift coefficient C_L; the lift is largest at 45 degrees. Without the key: 0.");
-  map.finish();
   return air;
 }
 
@@ -60,7 +58,6 @@ void readMembrane(const YamlCursor& at_membrane, ClothConfig& cloth)
                                           "Direction of the warp in the undeformed shape. Without the key: the first "
                                           "side of the grid, or x of a mesh."),
                              cloth.warp);
-  membrane.finish();
   at_membrane.attempt([&] { cloth.membrane = orthotropicMembrane(warp, weft, poisson, shear); });
 }
 
@@ -163,7 +160,6 @@ std::vector<int> readNear(const YamlCursor& at, const Eigen::Matrix3Xd& vertices
   const auto point = map.require("point", "Place near which vertices are held or loaded.").vector3(kCoordinate);
   map.get("radius", radius, kLength,
           "All vertices within this distance of `point` count. Without the key: the nearest one alone.");
-  map.finish();
   if (!point)
     return {};
   const Eigen::VectorXd distance = (vertices.colwise() - *point).colwise().norm();
@@ -188,15 +184,10 @@ std::vector<int> readHeldVertices(YamlMap& map, const ClothConfig& cloth)
   const YamlCursor corner = map.get("corner", "Corner of a grid.");
   const YamlCursor edge = map.get("edge", "All vertices along a side of a grid.");
   const YamlCursor near = map.get("near", "Vertices near a point, where the cloth starts.");
-  if (list.present() + corner.present() + edge.present() + near.present() != 1)
-  {
-    if (map.at().isMap())
-    {
-      map.at().problem(
-          "must have one of vertices: [...], corner: upper_left, edge: upper or near: {point: [x, y, z], radius: r}");
-    }
+  if (!map.hasOne(
+          {list, corner, edge, near},
+          "must have one of vertices: [...], corner: upper_left, edge: upper or near: {point: [x, y, z], radius: r}"))
     return {};
-  }
   if (cloth.mesh.vertices.cols() == 0)
     return {};   // reported
   if (list.present())
@@ -259,7 +250,6 @@ std::vector<ClothLoadConfig> readClothLoads(const YamlCursor& at, const ClothCon
     load.vertices = readHeldVertices(map, cloth);
     map.require("force", load.force, Range::closed(-1e15, 1e15, "N"),
                 "Force on each of the vertices; it keeps its size and its direction in the world.");
-    map.finish();
     loads.push_back(std::move(load));
   }
   return loads;
@@ -295,7 +285,6 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
                    grasp.attach == Attach::section);
     readOffset(map, grasp);
     readGraspContact(map, grasp);
-    map.finish();
     for (const int vertex : grasp.vertices)
     {
       const auto [other, is_new] = holders.emplace(vertex, name);
@@ -320,16 +309,14 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
               "cloth, otherwise cloth0, cloth1, ...");
   const YamlCursor grid = map.get("grid", "Rectangle of cloth. Give either `grid` or `mesh`.");
   const YamlCursor mesh = map.get("mesh", "Mesh of the undeformed cloth from a file. Give either `grid` or `mesh`.");
-  if (grid.present() == mesh.present())
-  {
-    at.problem("must have either grid: {corner: [...], sides: [[...], [...]], cells: N} or mesh: {file: PATH}");
-  }
-  else if (grid.present())
+  const bool one = map.hasOne(
+      {grid, mesh}, "must have either grid: {corner: [...], sides: [[...], [...]], cells: N} or mesh: {file: PATH}");
+  if (one && grid.present())
   {
     cloth.grid = readClothGrid(grid, context, cloth.mesh);
     cloth.warp = cloth.grid ? Eigen::Vector3d(cloth.grid->sides[0].normalized()) : cloth.warp;
   }
-  else if (!readClothMesh(mesh, context, cloth.mesh))
+  else if (one && !readClothMesh(mesh, context, cloth.mesh))
   {
     cloth.mesh = TriangleMesh{};
   }
@@ -337,7 +324,6 @@ ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const st
   cloth.loads = readClothLoads(
       map.get("loads", "Forces on vertices that act all the time, in steps and in statics. Without the key: none."),
       cloth);
-  map.finish();
   return cloth;
 }
 

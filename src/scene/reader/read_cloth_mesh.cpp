@@ -58,7 +58,6 @@ std::optional<MeshFile> readMeshFile(const YamlCursor& at, const ReadContext& co
   read.pose =
       readPose(map.get("pose", "Where the mesh is placed, after scaling. Without the key: at the origin, not turned."))
           .value_or(Pose{});
-  map.finish();
   const auto text = file.text();
   if (!text)
     return std::nullopt;
@@ -121,7 +120,6 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
   assign(seed, at_seed.integer(0, 2'000'000'000));
   if (at_seed.present() && pattern != GridPattern::irregular)
     at_seed.problem("is for pattern: irregular");
-  map.finish();
   if (!good || !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
     return std::nullopt;
   if (!at.attempt([&] { mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed)); }))

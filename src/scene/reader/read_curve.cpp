@@ -175,7 +175,6 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 {
   if (!at.present())
     return std::nullopt;
-  const std::size_t before = at.problems().size();
   YamlMap kinds(at.sharesKeysOf("rods.N.centerline"));
   std::optional<Curve> curve;
   int given = 0;
@@ -201,12 +200,12 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
   read("vee", "Two straight arms that meet at a tip.", readVee);
   read("file", "A polyline through the points of a file.", [&](YamlMap& map) { return readFile(map, context); });
   kinds.finish();
-  if (given != 1 && at.problems().size() == before)
+  if (given != 1 && kinds.sound())
   {
     at.problem("names " + std::to_string(given) +
                " curves; must name one of: straight, polyline, arc, helix, catenary, trefoil, torus_knot, vee, file");
   }
-  return at.problems().size() == before ? curve : std::nullopt;
+  return kinds.sound() ? curve : std::nullopt;
 }
 
 }   // namespace slender

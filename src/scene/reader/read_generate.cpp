@@ -20,21 +20,18 @@ Generated readGenerators(const YamlCursor& at, const ReadContext& context, int f
     return all;
   for (const YamlCursor& item : at.items())
   {
-    const std::size_t before = item.problems().size();
     YamlMap map(item);
     const YamlCursor chain = map.get("chain", "A chain of round links, each of which is a rod.");
     const YamlCursor tree = map.get("tree", "A tree: each branch is a tapered rod, and small balls join the branches.");
     const YamlCursor hair = map.get("hair", "Strands of hair on a ball, which is an obstacle; each strand is a rod.");
     map.finish();
-    if (item.problems().size() != before)
+    if (!map.sound() || !map.hasOne({chain, tree, hair}, "must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}"))
       continue;
-    if (chain.present() + tree.present() + hair.present() != 1)
-      item.problem("must be one of {chain: {...}}, {tree: {...}}, {hair: {...}}");
-    else if (chain.present())
+    if (chain.present())
       generateChain(chain, context, all);
     else if (tree.present())
       generateTree(tree, context, first_rod + static_cast<int>(all.rods.size()), all);
-    else if (hair.present())
+    else
       generateHair(hair, context, all);
   }
   return all;

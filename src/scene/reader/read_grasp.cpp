@@ -30,16 +30,10 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
       map.get("nodes",
               "Nodes that are held, as consecutive indices; a negative index counts from the end, and \"3..7\" is a "
               "range. One index holds the section at that node. Give either `edges` or `nodes`.");
-  if (edge_list.present() == node_list.present())
-  {
-    if (map.at().isMap())
-    {
-      map.at().problem(
-          "must have either edges or nodes, for example edges: [0] for the start of the rod or edges: [-1] for its "
-          "end");
-    }
+  if (!map.hasOne({edge_list, node_list},
+                  "must have either edges or nodes, for example edges: [0] for the start of the rod or edges: [-1] for "
+                  "its end"))
     return;
-  }
   if (node_list.present())
   {
     const int nodes = edges == 0 ? 0 : edges + (closed ? 0 : 1);
@@ -216,7 +210,6 @@ void readGraspContact(YamlMap& map, GraspConfig& grasp)
                   "the key the part near the grasp passes through the links of robots that the held part touches at "
                   "the start; with [] through none.");
   ignore.takes("a list of names");
-  contact.finish();
   if (!ignore.present())
     return;
   grasp.ignored_contacts.emplace();
@@ -270,7 +263,6 @@ GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadC
     hold.problem("holds " + std::to_string(grasp.last_node - grasp.first_node + 1) +
                  " nodes; a point pin holds one: give nodes: [INDEX], or edges: [0] or [-1]");
   }
-  map.finish();
   return grasp;
 }
 

@@ -178,7 +178,6 @@ void refuseOtherKeys(const MotionKeys& keys)
 /// Nothing, after a report, unless the keys say one kind of motion.
 std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
 {
-  const std::size_t before = at.problems().size();
   YamlMap map(at);
   MotionKeys keys{
       map.get("frames",
@@ -210,17 +209,10 @@ std::optional<MotionKeys> readMotionKeys(const YamlCursor& at)
               "What the guide does when no message comes: hold the last one, or go on at the last speed, which dies "
               "out. Without the key: hold.")};
   map.finish();
-  if (keys.frames.present() + keys.bodies.present() + keys.topic.present() + keys.bag.present() + keys.tf.present() !=
-      1)
-  {
-    if (at.problems().size() == before)
-    {
-      at.problem(
-          "must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: "
-          "FILE.bag}, {topic: points}, {topic: bodies, groups: obj}, {tf: FRAME}");
-    }
+  if (!map.hasOne({keys.frames, keys.bodies, keys.topic, keys.bag, keys.tf},
+                  "must be fixed or one of {frames: DIR/NAME_*.obj, rate: HZ}, {bodies: FILE.csv, groups: obj}, {bag: "
+                  "FILE.bag}, {topic: points}, {topic: bodies, groups: obj}, {tf: FRAME}"))
     return std::nullopt;
-  }
   const std::optional<bool> chosen = keys.topic.choice<bool>({{"points", true}, {"bodies", false}});
   if (keys.topic.present() && !chosen)
     return std::nullopt;
@@ -338,7 +330,6 @@ std::optional<double> readLate(const YamlCursor& at)
   std::optional<double> coast;
   map.require("extrapolate", coast, Range::above(0, 60, "s"),
               "Time within which the last speed dies out. The word extrapolate alone means 0.2 s.");
-  map.finish();
   return coast;
 }
 
@@ -397,22 +388,16 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
       if (other.present())
         other.problem("does not go with cloth, which is mesh and motion of the guide");
     readPreview(cloth, cloths, source);
-    map.finish();
     return source;
   }
-  if (mesh.present() == grid.present())
-  {
-    if (at.isMap())
-    {
-      at.problem(
-          "must have one of mesh: {file: PATH}, grid: {corner: [...], sides: [[...], [...]], cells: N}, cloth: NAME");
-    }
-  }
-  else if (grid.present())
+  const bool one = map.hasOne(
+      {mesh, grid},
+      "must have one of mesh: {file: PATH}, grid: {corner: [...], sides: [[...], [...]], cells: N}, cloth: NAME");
+  if (one && grid.present())
   {
     source.grid = readClothGrid(grid, context, source.config.mesh);
   }
-  else if ((source.file = readMeshFile(mesh.sharesKeysOf("cloths.N.mesh"), context)))
+  else if (one && (source.file = readMeshFile(mesh.sharesKeysOf("cloths.N.mesh"), context)))
   {
     source.config.mesh = source.file->mesh;
     const std::vector<MeshDefect> defects = topologyDefects(source.config.mesh);   // it may meet itself
@@ -423,7 +408,6 @@ GuideSource readGuide(const YamlCursor& at, const ReadContext& context, const st
     }
   }
   readGuideMotion(motion, context, object, source);
-  map.finish();
   return source;
 }
 

@@ -30,7 +30,6 @@ std::optional<RecordedGuide> readBag(const YamlCursor& at, const ReadContext& co
     map.get("topic", source.topic, "Topic of the messages, if the bag holds several.");
     map.get("cloth", source.object,
             "Name of the cloth in the messages. Without the key: the name of the tracked cloth.");
-    map.finish();
   }
   else
   {

@@ -41,7 +41,6 @@ LimitsConfig readLimits(const YamlCursor& at)
           "is, in a node until `~pause` with false lets it go on. `release`: the grasp is released; for a strain the "
           "grasp of that object with the largest force. `stop`: the simulation stops as after a failed step. Without "
           "the key: warn.");
-  map.finish();
   return limits;
 }
 
@@ -53,7 +52,6 @@ GraspLimits readGraspLimits(const YamlCursor& at)
             "Largest force on this grasp; `none` for no limit. Without the key: `limits.force` of the scene.");
   readLimit(map, "torque", limits.torque, "N m",
             "Largest torque on this grasp; `none` for no limit. Without the key: `limits.torque` of the scene.");
-  map.finish();
   return limits;
 }
 

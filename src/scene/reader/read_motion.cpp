@@ -80,7 +80,6 @@ PoseKeys readPoseKeys(const YamlCursor& at, const char* topic, const char* body,
       map.get("file",
               "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, give `body` "
               "as well.")};
-  map.finish();
   if (keys.offset.present() && !keys.tf.present())
     keys.offset.problem("is for motion: {tf: FRAME}");
   return keys;

@@ -31,7 +31,6 @@ RecordConfig readRecord(const YamlCursor& at)
           item.problem("is named twice; leave one out");
         record.fields.push_back(*field);
       }
-  map.finish();
   return record;
 }
 

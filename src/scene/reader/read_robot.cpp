@@ -141,7 +141,6 @@ void readRobot(const YamlCursor& at, const ReadContext& context,
   const Pose X_WR = readPose(pose).value_or(Pose());
   map.get("friction", common.friction, Range::closed(0, 100),
           "Coefficient of friction of all links, as of an obstacle. Without the key: that of the other object.");
-  map.finish();
   if (!description)
     return;
   const std::size_t before = obstacles.size();

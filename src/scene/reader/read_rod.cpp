@@ -234,11 +234,9 @@ CrossSection readCrossSection(const YamlCursor& at, int edges)
                                      "Half-axes [a, b] of an elliptical section, a along d1 and b along d2. Each is "
                                      "one number, two for a taper, or one per edge.");
   map.finish();
-  if (at.isMap() && round.present() == ellipse.present())
-  {
-    at.problem("must have either radius or ellipse: [a, b]");
-  }
-  else if (round.present())
+  if (!map.hasOne({round, ellipse}, "must have either radius or ellipse: [a, b]"))
+    return section;
+  if (round.present())
   {
     if (const auto values = round.numbers(radius))
     {
@@ -246,16 +244,13 @@ CrossSection readCrossSection(const YamlCursor& at, int edges)
       section.a = section.b = *values;
     }
   }
-  else if (ellipse.present())
+  const auto axes = ellipse.present() ? ellipse.items(2, 2) : std::vector<YamlCursor>();
+  for (std::size_t k = 0; k < axes.size(); ++k)
   {
-    const auto axes = ellipse.items(2, 2);
-    for (std::size_t k = 0; k < axes.size(); ++k)
+    if (const auto values = axes[k].numbers(radius))
     {
-      if (const auto values = axes[k].numbers(radius))
-      {
-        checkCount(axes[k], values->size(), edges);
-        (k == 0 ? section.a : section.b) = *values;
-      }
+      checkCount(axes[k], values->size(), edges);
+      (k == 0 ? section.a : section.b) = *values;
     }
   }
   return section;
@@ -321,7 +316,6 @@ Material readMaterial(const YamlCursor& at)
                               "[B1, B2] for bending towards d1 and d2, or a symmetric 2x2 matrix."));
   map.get("twist_modulus", material.twist_modulus, stiffness,
           "Moment per twist rate (G J), in place of what follows from youngs_modulus and poissons_ratio.");
-  map.finish();
   checkModuli(map, at_youngs);
   return material;
 }
@@ -337,7 +331,6 @@ Damping readDamping(const YamlCursor& at)
           "Without the key: 0.");
   map.get("drag", damping.drag, Range::closed(0, 1e6, "N s/m^2"),
           "Drag force per length and per velocity relative to the wind. Without the key: 0, and wind has no effect.");
-  map.finish();
   return damping;
 }
 
@@ -422,7 +415,6 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
                                                "Sections whose frames (x along the tangent, y along d1) nodes publish "
                                                "on tf, as NODE/rods/ROD/NAME. Without the key: none."),
                                        rod.closed, edges);
-  map.finish();
   return {std::move(rod), edges};
 }
 

@@ -101,7 +101,6 @@ std::optional<Pose> readPose(const YamlCursor& at)
   const YamlCursor rpy =
       map.get("rpy", "Orientation as roll, pitch and yaw about the fixed axes x, y and z, in this order.");
   orientation.takes("a unit quaternion [x, y, z, w]");
-  map.finish();
   if (orientation.present() && rpy.present())
   {
     at.problem("must have either orientation: [x, y, z, w] or rpy: [roll, pitch, yaw]");
@@ -142,7 +141,6 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   at.sharesKeysOf("obstacles.N.shape");
   if (!at.present())
     return std::nullopt;
-  const std::size_t before = at.problems().size();
   if (!at.isMap())
     return at.problem("must be a map with one shape and its measures, e.g. {plane: {}} or {sphere: {radius: 0.1}}");
   YamlMap kinds(at);
@@ -155,7 +153,6 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
       ++given;
       YamlMap map(value);
       shape = reader(map);
-      map.finish();
     }
   };
   read("plane", "A half-space below a plane: z of the pose points out of the solid. `plane: {}` is the floor z = 0.",
@@ -170,12 +167,12 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
   read("capsule", "A cylinder about z with round ends, centred at the origin of the pose.", readRound<Capsule>);
   read("mesh", "A closed triangle mesh.", [&](YamlMap& map) { return readMesh(map, context); });
   kinds.finish();
-  if (given != 1 && at.problems().size() == before)
+  if (given != 1 && kinds.sound())
   {
     at.problem("names " + std::to_string(given) +
                " shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh");
   }
-  const bool good = at.problems().size() == before && at.attempt([&] { checkShape(*shape); });
+  const bool good = kinds.sound() && at.attempt([&] { checkShape(*shape); });
   return good ? shape : std::nullopt;
 }
 
@@ -205,7 +202,6 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
         "barrier if rods, threads, simulated bodies or another cloth with barrier have contact, otherwise impulses; a "
         "cloth that has a max_traction or more than 500 test functions, or is a guide, always takes impulses.");
   }
-  map.finish();
   return contact;
 }
 
@@ -214,7 +210,6 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
                           const std::vector<BodyConfig>& bodies)
 {
   ContactConfig contact;
-  const std::size_t before = at.problems().size();
   YamlMap map(at);
   double smallest = std::numeric_limits<double>::infinity();
   for (const ReadRod& rod : rods)
@@ -255,7 +250,7 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
           "Friction that sticks is a spring, which slips when it is stretched by this speed times time.step. Without "
           "the key: 1e-4 m/s.");
   map.finish();
-  if (at.present() && !any && at.problems().size() == before)
+  if (at.present() && !any && map.sound())
   {
     at.problem(
         "no rod, thread, or cloth with method: barrier takes part; give those that do a contact of their own, for "
@@ -285,7 +280,6 @@ std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContex
            readSolidMotion(map.get("motion", "How the obstacle moves. Without the key: it stands."), context, false));
     startAtTable(obstacle.motion, at_pose.present() ? at_pose : map.at(), "obstacle", pose);
     assign(obstacle.pose, pose);
-    map.finish();
     return obstacle;
   });
 }

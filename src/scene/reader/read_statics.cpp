@@ -16,12 +16,8 @@ void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
               "Where the load acts, as an arc length of the rest shape from the first node, or at the rod's start or "
               "end. Between two nodes both bear the load. Give either `at` or `node`.");
   const YamlCursor node = map.get("node", "Node on which the load acts. Give either `at` or `node`.");
-  if (at.present() == node.present())
-  {
-    if (map.at().isMap())
-      map.at().problem("must have either at: start, end or an arc length [m], or node: INDEX");
+  if (!map.hasOne({at, node}, "must have either at: start, end or an arc length [m], or node: INDEX"))
     return;
-  }
   const int nodes = edges == 0 ? max_edges + 1 : edges + (closed ? 0 : 1);
   if (node.present())
   {
@@ -62,7 +58,6 @@ RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
   {
     assign(load.torque, torque.number(Range::closed(-1e15, 1e15, "N m")));
   }
-  map.finish();
   if (at.isMap() && !force.present() && !torque.present())
     at.problem("has neither force: [x, y, z] nor torque; must have one of them");
   return load;
@@ -81,7 +76,6 @@ std::optional<PathConfig> readPath(const YamlCursor& at)
           "Without the key: 20.");
   if (path.from == path.to)
     to.problem("is the factor that the path starts from; must differ from it");
-  map.finish();
   return path;
 }
 
@@ -97,7 +91,6 @@ std::optional<double> readBuckling(const YamlCursor& at)
     double up_to = kFarEnough;
     map.get("up_to", up_to, Range::above(0, most_factor),
             "Largest load factor up to which the critical one is looked for. Without the key: 1000000.");
-    map.finish();
     return up_to;
   }
   return at.boolean().value_or(false) ? std::optional<double>(kFarEnough) : std::nullopt;
@@ -146,7 +139,6 @@ StartConfig readStart(const YamlCursor& at)
   map.get(
       "accept_unstable", start.accept_unstable,
       "Whether an unstable equilibrium is accepted with a warning. Without the key: false, such a scene is refused.");
-  map.finish();
   if (start.keep_velocities && !start.equilibrium)
     keep.problem("needs equilibrium: true; a scene that starts as given keeps all velocities anyway");
   return start;
@@ -186,7 +178,6 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
       readBuckling(map.get("buckling",
                            "Whether the critical load factor is found: the smallest at which the equilibrium stops "
                            "being stable. Give true, or a map with `up_to`. Without the key: false."));
-  map.finish();
   return statics;
 }
 

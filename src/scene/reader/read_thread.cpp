@@ -26,11 +26,9 @@ TimedNumber readTimed(const YamlCursor& at, const Range& range)
       map.get("table", "Values over time: rows [t, value] with t in s. Values between rows are interpolated.");
   initial.takes("a number in the range of the key above");
   map.finish();
-  if (topic.present() == table.present())
-  {
-    at.problem("must be a number, {table: [[t, value], ...]} or {topic: true, initial: value}");
-  }
-  else if (table.present() && initial.present())
+  if (!map.hasOne({topic, table}, "must be a number, {table: [[t, value], ...]} or {topic: true, initial: value}"))
+    return timed;
+  if (table.present() && initial.present())
   {
     initial.problem("is for values by messages; a table begins with its own first value");
   }
@@ -93,7 +91,6 @@ NozzleConfig readNozzle(const YamlCursor& at, const ReadContext& context, double
     }
     nozzle.pose = table->poses.evaluate(0.0);
   }
-  map.finish();
   return nozzle;
 }
 
@@ -117,7 +114,6 @@ FloorConfig readFloor(const YamlCursor& at)
     const YamlCursor topic = velocity.get("topic",
                                           "Whether messages on `belt/velocity` set both velocities; `x` and `y` hold "
                                           "until the first one. Without the key: false.");
-    velocity.finish();
     if (x.present())
       floor.belt_x = readTimed(x, speed);
     if (y.present())
@@ -154,7 +150,6 @@ FloorConfig readFloor(const YamlCursor& at)
   floor.friction = friction.number(Range::closed(0, 100, "[-]"));
   if (floor.friction && floor.on_surface)
     on_surface.problem("is for floors that the thread sticks to, without floor.friction");
-  map.finish();
   return floor;
 }
 
@@ -180,7 +175,6 @@ void readEdges(const YamlCursor& at, ThreadConfig& thread)
     shortest.problem("must be at most 0.4 of edges.longest (" + shortNumber(0.4 * thread.longest_edge) +
                      " m), or edges would be joined and divided in turn");
   }
-  map.finish();
 }
 
 /// true, false or {until: SHARE}.
@@ -196,7 +190,6 @@ void readMerging(const YamlCursor& at, ThreadConfig& thread)
     thread.merging = half_discs;
     map.get("until", thread.merging, Range::closed(0.05, 0.95, "of the sum of the radii"),
             "Distance of the centrelines at which merging ends. Without the key: 0.6.");
-    map.finish();
   }
   else if (at.boolean().value_or(false))
   {
@@ -226,7 +219,6 @@ void readThreadCurve(const YamlCursor& centerline, const YamlCursor& radius, con
                              "Whether the newest end is clamped where it is. Without the key: free."};
   for (int end = 0; end < 2; ++end)
     held.get(names[end], thread.held[end], {{"free", false}, {"held", true}}, meanings[end]);
-  held.finish();
 }
 
 void readRegion(const YamlCursor& region, ThreadConfig& thread)
@@ -236,7 +228,6 @@ void readRegion(const YamlCursor& region, ThreadConfig& thread)
   YamlMap box(region);
   const YamlCursor low = box.require("from", "Lower corner of the box.");
   const YamlCursor high = box.require("to", "Upper corner of the box.");
-  box.finish();
   const Range anywhere = Range::closed(-1e9, 1e9, "m");
   const auto a = low.vector3(anywhere), b = high.vector3(anywhere);
   if (a && b && !(b->array() > a->array()).all())
@@ -271,18 +262,16 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
                                     "Radius of a thread with a `centerline`: one number, two for a taper from the "
                                     "oldest end to the newest, or one per edge. It must be given there.");
   const YamlCursor ends = map.get("ends", "Ends of a thread with a `centerline`. Without the key both are free.");
-  if (nozzle.present() == centerline.present())
-  {
-    at.problem("must have either a nozzle that it flows out of, or a centerline (with radius)");
-  }
-  else if (nozzle.present())
+  const bool one =
+      map.hasOne({nozzle, centerline}, "must have either a nozzle that it flows out of, or a centerline (with radius)");
+  if (one && nozzle.present())
   {
     thread.nozzle = readNozzle(nozzle, context, thread.swirl);
     for (const YamlCursor& other : {radius, ends})
       if (other.present())
         other.problem("is for threads with a centerline; the nozzle says it here");
   }
-  else
+  else if (one)
   {
     readThreadCurve(centerline, radius, ends, context, thread);
   }
@@ -314,7 +303,6 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
                                     "Box in which fluid is kept: what lies outside is dropped, the oldest first. "
                                     "Without the key everything is kept.");
   readRegion(region, thread);
-  map.finish();
   return thread;
 }
 

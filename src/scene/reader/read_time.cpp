@@ -56,8 +56,6 @@ TimeConfig readTime(const YamlCursor& at)
               {"conjugate_gradients", IslandSolver::conjugate_gradients}},
              "Solver of the linear equations of objects that touch or are joined. Without the key, or with auto, it is "
              "chosen by their kinds and number, and by the number of contacts.");
-  newton.finish();
-  map.finish();
   return time;
 }
 

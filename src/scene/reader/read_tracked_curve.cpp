@@ -60,12 +60,9 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
   GuideNodes guide;
   const int fewest = rod.closed ? 3 : 2;
   nodes.takes("a whole number, from 2 (of a closed rod 3) to the number of the rod's nodes");
-  if (nodes.present() + points.present() + file.present() != 1)
-  {
-    if (map.at().isMap())
-      map.at().problem("must have one of nodes: N (of the rod), points: [[x, y, z], ...], file: PATH");
+  if (!map.hasOne({nodes, points, file},
+                  "must have one of nodes: N (of the rod), points: [[x, y, z], ...], file: PATH"))
     return guide;
-  }
   if (nodes.present())
   {
     const int most = rod.rest.cols() > 0 ? static_cast<int>(rod.rest.cols()) : max_edges + 1;
@@ -155,7 +152,6 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
     at.choice<bool>({{"fixed", true}});
     return;
   }
-  const std::size_t before = at.problems().size();
   YamlMap map(at);
   const YamlCursor table =
       map.get("table", "Motion of all nodes of the guide: rows [t, x0, y0, z0, x1, ...], interpolated smoothly.");
@@ -171,14 +167,10 @@ void readCurveMotion(const YamlCursor& at, const ReadContext& context, GuideConf
                                     "With `tf`. `initial`: the frame carries the guide from where both are at first. "
                                     "`frame`: the guide is given in the frame. Without the key: initial.");
   map.finish();
-  if (table.present() + file.present() + topic.present() + tf.present() != 1)
-  {
-    if (at.problems().size() == before)
-      at.problem(
-          "must be fixed or one of {table: [[t, x0, y0, z0, x1, ...], ...]}, {file: FILE.csv}, {topic: points}, {tf: "
-          "FRAME}");
+  if (!map.hasOne({table, file, topic, tf},
+                  "must be fixed or one of {table: [[t, x0, y0, z0, x1, ...], ...]}, {file: FILE.csv}, {topic: "
+                  "points}, {tf: FRAME}"))
     return;
-  }
   if (late.present() && !topic.present() && !tf.present())
     late.problem("is for guides by topic or tf");
   for (const YamlCursor& key : {offset, attach})
@@ -218,12 +210,8 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
       map.get("segments", "Number of equal parts of the rod's length whose averages are prescribed.");
   segments.takes("a whole number, from 1 to the number of the rod's nodes");
   map.finish();
-  if (basis.present() == segments.present())
-  {
-    if (at.isMap())
-      at.problem("must be one of {basis: hats}, {segments: N}");
+  if (!map.hasOne({basis, segments}, "must be one of {basis: hats}, {segments: N}"))
     return {};
-  }
   if (basis.present())
     return basis.choice<bool>({{"hats", true}}) ? curveHats(weights) : TestFunctions{};
   const auto count =
@@ -238,7 +226,6 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
 {
   if (!at.present())
     return nullptr;
-  const std::size_t before = at.problems().size();
   TrackedCurve rod;
   rod.closed = config.closed;
   rod.shares = Eigen::Vector2d(0, 1);
@@ -278,7 +265,7 @@ std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, con
         .problem("makes " + std::to_string(set.functions.count()) + " test functions of " +
                  std::to_string(rod.rest.cols()) + " nodes, too many for one rod; leave out some");
   }
-  if (!good || at.problems().size() != before)
+  if (!good || !map.sound())
     return nullptr;
   const bool independent = (at_functions.present() ? at_functions : at).attempt([&] {
     auto constraints =

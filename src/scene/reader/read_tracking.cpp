@@ -56,7 +56,6 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
     {
       const auto given =
           map.require("subdivide", "How often each face of the guide is divided into four.").integer(1, 10, "levels");
-      map.finish();
       if (!given)
         return tracked;
       levels = *given;
@@ -124,7 +123,6 @@ TestFunctions readClusters(const YamlCursor& at, const GuideConfig& guide)
   options.seed = static_cast<unsigned>(seed);
   map.get("frames", options.sampled_frames, Range::closed(1, 10'000),
           "Number of frames of the guide's motion that the regions suit. Without the key: 20.");
-  map.finish();
   const auto* carried = std::get_if<CarriedGuide>(&guide.motion);
   const bool live = std::holds_alternative<TopicGuide>(guide.motion) || (carried && carried->poses.empty());
   const bool simulated = std::holds_alternative<ClothGuide>(guide.motion);
@@ -167,7 +165,6 @@ std::vector<PaintedRegion> readRegions(const YamlCursor& at, const ReadContext& 
         tracked.kind == TrackedMesh::separate ? map.require("tracked", meaning) : map.get("tracked", meaning);
     if (own.present())
       region.tracked = readIndexList(own, static_cast<int>(tracked.subdivision.mesh.vertices.cols()));
-    map.finish();
     regions.push_back(std::move(region));
   }
   return regions;
@@ -388,7 +385,6 @@ ClothConfig readTrackedCloth(const YamlCursor& at, const ReadContext& context, c
     cloth.start_velocity = velocities * tracked.subdivision.weights.transpose();
   }
   readClothTraits(map, context, cloth);
-  map.finish();
   if (tracked.good && guide.config.mesh.vertices.cols() > 0)
     cloth.tracking = readTracking(at_functions, tractions, context, guide, tracked, cloth);
   return cloth;

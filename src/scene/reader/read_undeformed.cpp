@@ -50,21 +50,18 @@ bool ridgesFit(const YamlCursor& at, const Eigen::Vector3d& axis, int count, con
 }
 
 /// The cloth's mesh folded, ridged or crinkled; empty when reported.
-Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, const YamlCursor& ridges,
+Eigen::Matrix3Xd readOffsets(const YamlMap& map, const YamlCursor& folds, const YamlCursor& ridges,
                              const YamlCursor& crinkles, const TriangleMesh& cloth)
 {
-  if (folds.present() + ridges.present() + crinkles.present() != 1)
-  {
-    at.problem(
-        "must have one of {file: PATH}, {folds: {along: [...], wavelength: L, height: H}}, {ridges: {axis: [...], "
-        "count: N, height: H}}, {crinkles: {height: H}}");
+  if (!map.hasOne({folds, ridges, crinkles},
+                  "must have one of {file: PATH}, {folds: {along: [...], wavelength: L, height: H}}, {ridges: {axis: "
+                  "[...], count: N, height: H}}, {crinkles: {height: H}}"))
     return {};
-  }
   YamlMap shape(folds.present() ? folds : ridges.present() ? ridges : crinkles);
   std::optional<double> height;
   shape.require("height", height, Range::above(0, 10, "m"), "Height of the offsets from the mesh, along its normals.");
   Eigen::Vector3d direction(0, 0, 1);
-  const std::size_t before = at.problems().size();
+  const std::size_t before = map.at().problems().size();
   double wavelength = 1.0;
   int count = 1, seed = 1;
   if (crinkles.present())
@@ -94,7 +91,6 @@ Eigen::Matrix3Xd readOffsets(const YamlCursor& at, const YamlCursor& folds, cons
                                    : ridgesFit(scale, direction, count, cloth)))
       return {};
   }
-  shape.finish();
   if (!height || cloth.vertices.cols() == 0)
     return {};
   return folds.present()    ? folded(cloth, direction, wavelength, *height)
@@ -120,7 +116,7 @@ void readUndeformed(const YamlCursor& at, const ReadContext& context, ClothConfi
           "Whether lengths at rest are also those of the offset shape; the cloth still starts as its mesh. Without the "
           "key: false, lengths at rest are those of the mesh.");
   map.finish();
-  const Eigen::Matrix3Xd shape = readOffsets(at, folds, ridges, crinkles, cloth.mesh);
+  const Eigen::Matrix3Xd shape = readOffsets(map, folds, ridges, crinkles, cloth.mesh);
   if (shape.cols() == 0 || !lengths)
   {
     cloth.undeformed = shape;

@@ -26,7 +26,6 @@ std::vector<std::string> readSeries(const YamlCursor& at)
   const auto from = from_at.number({}), to = map.require("to", "Last value of the series.").number({});
   const auto count = map.require("count", "Number of values.").integer(2, max_points);
   const bool log = log_at.boolean().value_or(false);
-  map.finish();
   std::vector<std::string> values;
   if (!from || !to || !count)
     return values;
@@ -79,7 +78,6 @@ SweepPlot readPlot(const YamlCursor& at)
       assign(plot.y_label, words[1].text());
     }
   }
-  map.finish();
   return plot;
 }
 

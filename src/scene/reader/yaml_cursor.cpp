@@ -338,7 +338,7 @@ std::vector<std::pair<std::string, YamlCursor>> YamlCursor::members(const char* 
 
 YamlCursor YamlCursor::find(const std::string& key) const { return YamlMap(*this).find(key); }
 
-YamlMap::YamlMap(const YamlCursor& at) : at_(at)
+YamlMap::YamlMap(const YamlCursor& at) : at_(at), before_(at.problems().size())
 {
   if (at.isMap())
     map_ = at.tree();
@@ -373,13 +373,26 @@ YamlCursor YamlMap::find(const std::string& key) const { return childOf(key, nul
 
 void YamlMap::missing(const std::string& key) const { find(key).problem("is missing"); }
 
+bool YamlMap::hasOne(std::initializer_list<YamlCursor> keys, const std::string& otherwise) const
+{
+  const bool one = std::count_if(keys.begin(), keys.end(), [](const YamlCursor& key) { return key.present(); }) == 1;
+  if (!one && map_ && !has_unknown_)
+    at_.problem(otherwise);
+  return one;
+}
+
 void YamlMap::finish()
 {
-  if (!map_)
+  if (!map_ || known_.empty())
     return;
   for (const auto& [key, value] : map_->members)
-    if (std::find(known_.begin(), known_.end(), key) == known_.end())
-      find(key).problem("unknown key" + didYouMean(key, known_) + "; known here: " + joinWords(known_));
+  {
+    if (std::find(known_.begin(), known_.end(), key) != known_.end())
+      continue;
+    find(key).problem("unknown key" + didYouMean(key, known_) + "; known here: " + joinWords(known_));
+    has_unknown_ = true;
+  }
+  known_.clear();
 }
 
 }   // namespace slender

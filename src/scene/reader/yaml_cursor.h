@@ -1,6 +1,7 @@
 #pragma once
 
 #include <exception>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <string>
@@ -215,12 +216,14 @@ private:
 };
 
 /// A map whose keys are asked for by name, each with its meaning: a sentence that says what the key does and what holds
-/// without it. The meanings are the text of docs/scene_reference.md. Keys nobody asked for are reported by finish(),
-/// with the nearest known one.
+/// without it. The meanings are the text of docs/scene_reference.md. Keys nobody asked for are reported, with the
+/// nearest known one, where the map goes out of scope, or before by finish().
 class YamlMap
 {
 public:
   explicit YamlMap(const YamlCursor& at);
+  YamlMap(const YamlMap&) = delete;
+  ~YamlMap() { finish(); }
 
   YamlCursor get(const std::string& key, const char* meaning);
   /// Like get(), but reports a key that is missing.
@@ -259,6 +262,12 @@ public:
   void missing(const std::string& key) const;
   bool has(const std::string& key) const { return map_ && map_->find(key); }
   const YamlCursor& at() const { return at_; }
+  /// Whether nothing was reported since this map was begun.
+  bool sound() const { return at_.problems().size() == before_; }
+  /// Whether exactly one of these keys is given. Reports `otherwise` of the map if not, unless finish() has found an
+  /// unknown key, which may stand for one of them.
+  bool hasOne(std::initializer_list<YamlCursor> keys, const std::string& otherwise) const;
+  /// Reports unknown keys now, for checks that come after it. A map that was not asked for any key has none.
   void finish();
 
 private:
@@ -271,8 +280,10 @@ private:
   }
 
   YamlCursor at_;
+  std::size_t before_;   ///< number of problems when the map was begun
   const YamlTree* map_ = nullptr;
-  std::vector<std::string> known_;
+  std::vector<std::string> known_;   ///< until finish()
+  bool has_unknown_ = false;
 };
 
 /// The word most like `word` (few edits), or empty.
