@@ -6,29 +6,84 @@
 
 #include "slender_sim/scene/scene_state.h"
 
-/// The fields of all states, each listed once. Saving, restoring, the check for finite numbers and comparisons visit
-/// the same lists, so that they cannot drift apart. A new field of a state is added to its list here, and the version
-/// in state_file.cpp is raised.
+/// The fields of all states, each listed once, in the type that fieldsOf() would return. Saving, restoring, the check
+/// for finite numbers and comparisons visit the same lists, so that they cannot drift apart. A new field of a state is
+/// added to its list here, and the version in state_file.cpp is raised.
 namespace slender {
-
-/// Lists the fields of a state: visit(visitor, state) calls visitor(field, field, ...) with all of them.
-template <class State>
-struct Fields
-{
-  static constexpr bool listed = false;
-};
 
 /// A list of data members, in the order in which they are visited.
 template <auto... members>
 struct Members
 {
-  static constexpr bool listed = true;
   template <class Visitor, class State>
   static void visit(Visitor& visitor, State& state)
   {
     visitor(state.*members...);
   }
 };
+
+auto fieldsOf(const Pose&) -> Members<&Pose::position, &Pose::orientation>;
+auto fieldsOf(const Twist&) -> Members<&Twist::linear, &Twist::angular>;
+auto fieldsOf(const Wrench&) -> Members<&Wrench::force, &Wrench::torque>;
+auto fieldsOf(const EndLoad&) -> Members<&EndLoad::force, &EndLoad::torque>;
+auto fieldsOf(const GraspState&)
+    -> Members<&GraspState::active, &GraspState::first_node, &GraspState::last_node, &GraspState::holds_frame,
+               &GraspState::body, &GraspState::X_WG, &GraspState::velocity, &GraspState::nodes_G,
+               &GraspState::directors_G, &GraspState::section_G, &GraspState::section_twist>;
+auto fieldsOf(const RodState&)
+    -> Members<&RodState::x, &RodState::v, &RodState::d1, &RodState::twist, &RodState::director, &RodState::spin,
+               &RodState::grasps, &RodState::last_step, &RodState::next_step, &RodState::a, &RodState::x_previous,
+               &RodState::v_previous, &RodState::spin_rate, &RodState::spin_previous, &RodState::turn_previous,
+               &RodState::strain_rate, &RodState::strain_rate_previous, &RodState::strain_previous>;
+auto fieldsOf(const ThreadEnd&) -> Members<&ThreadEnd::held, &ThreadEnd::X_WE>;
+auto fieldsOf(const ThreadState&)
+    -> Members<&ThreadState::x, &ThreadState::v, &ThreadState::d1, &ThreadState::twist, &ThreadState::spin,
+               &ThreadState::volume, &ThreadState::id, &ThreadState::deposited, &ThreadState::ends,
+               &ThreadState::next_id, &ThreadState::thread_id, &ThreadState::fed_volume, &ThreadState::dropped_volume,
+               &ThreadState::left_volume>;
+auto fieldsOf(const ThreadGroupState&)
+    -> Members<&ThreadGroupState::threads, &ThreadGroupState::next_thread_id, &ThreadGroupState::dropped_volume,
+               &ThreadGroupState::left_volume, &ThreadGroupState::start_volume>;
+auto fieldsOf(const ClothState&)
+    -> Members<&ClothState::x, &ClothState::v, &ClothState::rest_angles, &ClothState::next_step,
+               &ClothState::stiffening, &ClothState::pins, &ClothState::at_bound, &ClothState::average_set>;
+auto fieldsOf(const ClothGrasp&)
+    -> Members<&ClothGrasp::active, &ClothGrasp::vertices, &ClothGrasp::points_G, &ClothGrasp::X_WG>;
+auto fieldsOf(const FunctionBlend&)
+    -> Members<&FunctionBlend::gap, &FunctionBlend::rate, &FunctionBlend::start, &FunctionBlend::duration>;
+auto fieldsOf(const GuideState&)
+    -> Members<&GuideState::points, &GuideState::velocity, &GuideState::forces, &GuideState::blend>;
+auto fieldsOf(const RigidBodyState&)
+    -> Members<&RigidBodyState::X_WB, &RigidBodyState::velocity, &RigidBodyState::last_step,
+               &RigidBodyState::linear_acceleration, &RigidBodyState::angular_acceleration, &RigidBodyState::X_previous,
+               &RigidBodyState::velocity_previous>;
+auto fieldsOf(const ContactPartner&) -> Members<&ContactPartner::kind, &ContactPartner::index>;
+auto fieldsOf(const ContactSpring&)
+    -> Members<&ContactSpring::partner, &ContactSpring::piece, &ContactSpring::point, &ContactSpring::tension>;
+auto fieldsOf(const ContactRange&) -> Members<&ContactRange::partner, &ContactRange::share>;
+auto fieldsOf(const ContactMemory&)
+    -> Members<&ContactMemory::stiffness, &ContactMemory::springs, &ContactMemory::ranges>;
+auto fieldsOf(const ContactMemories&)
+    -> Members<&ContactMemories::rods, &ContactMemories::threads, &ContactMemories::bodies, &ContactMemories::cloths>;
+auto fieldsOf(const SceneState&)
+    -> Members<&SceneState::time, &SceneState::steps, &SceneState::rods, &SceneState::rod_guides, &SceneState::threads,
+               &SceneState::cloths, &SceneState::cloth_guides, &SceneState::bodies, &SceneState::obstacles,
+               &SceneState::obstacle_velocities, &SceneState::contact, &SceneState::end_loads,
+               &SceneState::cloth_grasps, &SceneState::grasp_offsets, &SceneState::wrenches>;
+void fieldsOf(...);   // of what is no state
+
+enum class ListKind
+{
+  none,
+  fixed,   ///< of a size that the type says
+  dynamic
+};
+template <class Value>
+constexpr ListKind list_kind = std::is_array_v<Value> ? ListKind::fixed : ListKind::none;
+template <class Value, std::size_t count>
+constexpr ListKind list_kind<std::array<Value, count>> = ListKind::fixed;
+template <class Value>
+constexpr ListKind list_kind<std::vector<Value>> = ListKind::dynamic;
 
 /// Visits numbers, matrices, lists and states, down to the numbers and matrices, which `archive` takes.
 template <class Archive>
@@ -45,185 +100,24 @@ public:
 
 private:
   template <class Value>
-  struct IsList : std::false_type
-  {
-  };
-  template <class Value>
-  struct IsList<std::vector<Value>> : std::true_type
-  {
-  };
-
-  template <class Value>
   void visit(Value& value)
   {
     using Type = std::remove_const_t<Value>;
-    if constexpr (IsList<Type>::value)
-    {
+    using Listed = decltype(fieldsOf(value));
+    if constexpr (list_kind<Type> == ListKind::dynamic)
       archive_.list(value);
+    if constexpr (list_kind<Type> != ListKind::none)
       for (auto& entry : value)
         visit(entry);
-    }
-    else if constexpr (Fields<Type>::listed)
-      Fields<Type>::visit(*this, value);
+    else if constexpr (!std::is_void_v<Listed>)
+      Listed::visit(*this, value);
+    else if constexpr (std::is_same_v<Type, Eigen::Quaterniond>)
+      archive_(value.coeffs());
     else
       archive_(value);
   }
-  template <class Value, std::size_t count>
-  void visit(std::array<Value, count>& values)
-  {
-    for (auto& entry : values)
-      visit(entry);
-  }
-  template <class Value, std::size_t count>
-  void visit(const std::array<Value, count>& values)
-  {
-    for (const auto& entry : values)
-      visit(entry);
-  }
-
-  template <class Value, std::size_t count>
-  void visit(Value (&values)[count])
-  {
-    for (auto& entry : values)
-      visit(entry);
-  }
 
   Archive& archive_;
-};
-
-template <>
-struct Fields<Eigen::Quaterniond>
-{
-  static constexpr bool listed = true;
-  template <class Visitor, class State>
-  static void visit(Visitor& visitor, State& quaternion)
-  {
-    visitor(quaternion.coeffs());
-  }
-};
-
-template <>
-struct Fields<Pose> : Members<&Pose::position, &Pose::orientation>
-{
-};
-
-template <>
-struct Fields<Twist> : Members<&Twist::linear, &Twist::angular>
-{
-};
-
-template <>
-struct Fields<Wrench> : Members<&Wrench::force, &Wrench::torque>
-{
-};
-
-template <>
-struct Fields<EndLoad> : Members<&EndLoad::force, &EndLoad::torque>
-{
-};
-
-template <>
-struct Fields<GraspState>
-  : Members<&GraspState::active, &GraspState::first_node, &GraspState::last_node, &GraspState::holds_frame,
-            &GraspState::body, &GraspState::X_WG, &GraspState::velocity, &GraspState::nodes_G, &GraspState::directors_G,
-            &GraspState::section_G, &GraspState::section_twist>
-{
-};
-
-template <>
-struct Fields<RodState>
-  : Members<&RodState::x, &RodState::v, &RodState::d1, &RodState::twist, &RodState::director, &RodState::spin,
-            &RodState::grasps, &RodState::last_step, &RodState::next_step, &RodState::a, &RodState::x_previous,
-            &RodState::v_previous, &RodState::spin_rate, &RodState::spin_previous, &RodState::turn_previous,
-            &RodState::strain_rate, &RodState::strain_rate_previous, &RodState::strain_previous>
-{
-};
-
-template <>
-struct Fields<ThreadEnd> : Members<&ThreadEnd::held, &ThreadEnd::X_WE>
-{
-};
-
-template <>
-struct Fields<ThreadState>
-  : Members<&ThreadState::x, &ThreadState::v, &ThreadState::d1, &ThreadState::twist, &ThreadState::spin,
-            &ThreadState::volume, &ThreadState::id, &ThreadState::deposited, &ThreadState::ends, &ThreadState::next_id,
-            &ThreadState::thread_id, &ThreadState::fed_volume, &ThreadState::dropped_volume, &ThreadState::left_volume>
-{
-};
-
-template <>
-struct Fields<ThreadGroupState>
-  : Members<&ThreadGroupState::threads, &ThreadGroupState::next_thread_id, &ThreadGroupState::dropped_volume,
-            &ThreadGroupState::left_volume, &ThreadGroupState::start_volume>
-{
-};
-
-template <>
-struct Fields<ClothState>
-  : Members<&ClothState::x, &ClothState::v, &ClothState::rest_angles, &ClothState::next_step, &ClothState::stiffening,
-            &ClothState::pins, &ClothState::at_bound, &ClothState::average_set>
-{
-};
-
-template <>
-struct Fields<ClothGrasp>
-  : Members<&ClothGrasp::active, &ClothGrasp::vertices, &ClothGrasp::points_G, &ClothGrasp::X_WG>
-{
-};
-
-template <>
-struct Fields<FunctionBlend>
-  : Members<&FunctionBlend::gap, &FunctionBlend::rate, &FunctionBlend::start, &FunctionBlend::duration>
-{
-};
-
-template <>
-struct Fields<GuideState> : Members<&GuideState::points, &GuideState::velocity, &GuideState::forces, &GuideState::blend>
-{
-};
-
-template <>
-struct Fields<RigidBodyState> : Members<&RigidBodyState::X_WB, &RigidBodyState::velocity, &RigidBodyState::last_step,
-                                        &RigidBodyState::linear_acceleration, &RigidBodyState::angular_acceleration,
-                                        &RigidBodyState::X_previous, &RigidBodyState::velocity_previous>
-{
-};
-
-template <>
-struct Fields<ContactPartner> : Members<&ContactPartner::kind, &ContactPartner::index>
-{
-};
-
-template <>
-struct Fields<ContactSpring>
-  : Members<&ContactSpring::partner, &ContactSpring::piece, &ContactSpring::point, &ContactSpring::tension>
-{
-};
-
-template <>
-struct Fields<ContactRange> : Members<&ContactRange::partner, &ContactRange::share>
-{
-};
-
-template <>
-struct Fields<ContactMemory> : Members<&ContactMemory::stiffness, &ContactMemory::springs, &ContactMemory::ranges>
-{
-};
-
-template <>
-struct Fields<ContactMemories>
-  : Members<&ContactMemories::rods, &ContactMemories::threads, &ContactMemories::bodies, &ContactMemories::cloths>
-{
-};
-
-template <>
-struct Fields<SceneState>
-  : Members<&SceneState::time, &SceneState::steps, &SceneState::rods, &SceneState::rod_guides, &SceneState::threads,
-            &SceneState::cloths, &SceneState::cloth_guides, &SceneState::bodies, &SceneState::obstacles,
-            &SceneState::obstacle_velocities, &SceneState::contact, &SceneState::end_loads, &SceneState::cloth_grasps,
-            &SceneState::grasp_offsets, &SceneState::wrenches>
-{
 };
 
 }   // namespace slender
