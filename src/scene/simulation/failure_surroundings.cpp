@@ -62,9 +62,22 @@ public:
     if (place_.kind == Kind::none || object_ < 0 || !place_.position.allFinite())
       return "";
     findHolder();
-    place_.kind == Kind::rod      ? findPartnersOfRod()
-    : place_.kind == Kind::thread ? findPartnersOfThread()
-                                  : findPartnersOfCloth();
+    if (place_.kind == Kind::rod)
+    {
+      const RodModel& model = simulation_.rodModel(object_);
+      findPartners(config_.rods[object_].contact, largestRadius(model, std::min(place_.node, model.edges() - 1)));
+    }
+    else if (place_.kind == Kind::thread)
+    {
+      const double radius = radiusOfThread();
+      if (const auto& floor = config_.threads[object_].floor)
+        partner_.add(place_.position.z() - floor->height - radius, "the floor");
+      findPartners(config_.threads[object_].contact, radius);
+    }
+    else
+    {
+      findPartners(config_.cloths[object_].contact, 0.0);
+    }
     return holder_.text("grasp") + partner_.text("contact partner");
   }
 
@@ -119,9 +132,35 @@ private:
     return (x.middleCols(first, last - first + 1).colwise() - place_.position).colwise().norm().minCoeff();
   }
 
-  /// Obstacles, and the bodies that `touches` accepts; `radius`: of the object at the place [m].
-  template <class Touches>
-  void addSolids(double radius, Touches&& touches)
+  /// `radius`: of the object at the place [m].
+  void findPartners(const std::optional<ContactProperties>& contact, double radius)
+  {
+    if (!contact)
+      return;
+    if (contact->solids)
+      addSolids(radius);
+    const auto meets = [&](Kind kind, int index, const std::optional<ContactProperties>& other) {
+      return kind == place_.kind && index == object_ ? kind == Kind::rod && contact->self
+                                                     : contact->others && other && other->others;
+    };
+    for (int r = 0; place_.kind != Kind::cloth && r < static_cast<int>(config_.rods.size()); ++r)
+      if (meets(Kind::rod, r, config_.rods[r].contact))
+        addRod(r, radius);
+    for (int k = 0; place_.kind != Kind::cloth && k < static_cast<int>(config_.threads.size()); ++k)
+      if (meets(Kind::thread, k, config_.threads[k].contact))
+        addThread(k, radius);
+    for (int k = 0; place_.kind == Kind::cloth && k < static_cast<int>(config_.cloths.size()); ++k)
+      if (meets(Kind::cloth, k, config_.cloths[k].contact))
+        addCloth(k);
+  }
+
+  /// Rods pass through the bodies that they are welded to, and cloth meets driven bodies only.
+  bool touches(const BodyConfig& body) const
+  {
+    return place_.kind == Kind::rod ? !body.isWeldedTo(object_) : place_.kind == Kind::thread || body.motion;
+  }
+
+  void addSolids(double radius)
   {
     const SceneState& state = simulation_.state();
     for (std::size_t k = 0; k < config_.obstacles.size(); ++k)
@@ -144,28 +183,6 @@ private:
     partner_.add(pointSegmentDistance(place_.position, a, b) - radii, name);
   }
 
-  void findPartnersOfRod()
-  {
-    const auto& contact = config_.rods[object_].contact;
-    if (!contact)
-      return;
-    const RodModel& model = simulation_.rodModel(object_);
-    const double radius = largestRadius(model, std::min(place_.node, model.edges() - 1));
-    if (contact->solids)
-    {
-      addSolids(radius, [this](const BodyConfig& body) { return !body.isWeldedTo(object_); });
-    }
-    for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
-    {
-      const bool own = r == object_;
-      if (own ? !contact->self : !(contact->others && config_.rods[r].contact && config_.rods[r].contact->others))
-        continue;
-      addRod(r, radius);
-    }
-    if (contact->others)
-      addThreads(-1, radius);
-  }
-
   void addRod(int r, double radius)
   {
     const bool own = place_.kind == Kind::rod && r == object_;
@@ -181,15 +198,22 @@ private:
     }
   }
 
-  /// Those with contact but one.
-  void addThreads(int but, double radius)
+  void addThread(int k, double radius)
   {
-    for (int k = 0; k < static_cast<int>(config_.threads.size()); ++k)
-      if (k != but && config_.threads[k].contact && config_.threads[k].contact->others)
-        for (const ThreadState& thread : simulation_.state().threads[k].threads)
-          for (int j = 0; j < thread.edges(); ++j)
-            addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j),
-                       quoted("thread", config_.threads[k].name));
+    for (const ThreadState& thread : simulation_.state().threads[k].threads)
+      for (int j = 0; j < thread.edges(); ++j)
+        addSegment(thread.x[j], thread.x[j + 1], radius + thread.radius(j), quoted("thread", config_.threads[k].name));
+  }
+
+  void addCloth(int k)
+  {
+    const Eigen::Matrix3Xi& faces = config_.cloths[k].mesh.triangles;
+    const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].x;
+    for (Eigen::Index f = 0; f < faces.cols(); ++f)
+    {
+      partner_.add(pointTriangleDistance(place_.position, x.col(faces(0, f)), x.col(faces(1, f)), x.col(faces(2, f))),
+                   quoted("cloth", config_.cloths[k].name));
+    }
   }
 
   static double largestRadius(const RodModel& model, int edge)
@@ -211,13 +235,11 @@ private:
     return along > 0.5 * M_PI * (radii + config_.contact.gap) && along > 2.0 * distance;
   }
 
-  void findPartnersOfThread()
+  /// Where the place is [m].
+  double radiusOfThread() const
   {
-    const ThreadConfig& config = config_.threads[object_];
-    const SceneState& state = simulation_.state();
-    double radius = 0.0;   // where the place is
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const ThreadState& thread : state.threads[object_].threads)
+    double radius = 0.0, nearest = std::numeric_limits<double>::infinity();
+    for (const ThreadState& thread : simulation_.state().threads[object_].threads)
     {
       for (int j = 0; j < thread.edges(); ++j)
       {
@@ -228,40 +250,7 @@ private:
         }
       }
     }
-    if (config.floor)
-      partner_.add(place_.position.z() - config.floor->height - radius, "the floor");
-    if (config.contact && config.contact->solids)
-      addSolids(radius, [](const BodyConfig&) { return true; });
-    if (!config.contact || !config.contact->others)
-      return;
-    addThreads(object_, radius);
-    for (int r = 0; r < static_cast<int>(config_.rods.size()); ++r)
-      if (config_.rods[r].contact && config_.rods[r].contact->others)
-        addRod(r, radius);
-  }
-
-  void findPartnersOfCloth()
-  {
-    const auto& contact = config_.cloths[object_].contact;
-    if (!contact)
-      return;
-    if (contact->solids)
-    {
-      // cloth meets driven bodies only
-      addSolids(0.0, [](const BodyConfig& body) { return body.motion.has_value(); });
-    }
-    for (int k = 0; k < static_cast<int>(config_.cloths.size()); ++k)
-    {
-      if (k == object_ || !contact->others || !config_.cloths[k].contact || !config_.cloths[k].contact->others)
-        continue;
-      const Eigen::Matrix3Xi& faces = config_.cloths[k].mesh.triangles;
-      const Eigen::Matrix3Xd& x = simulation_.state().cloths[k].x;
-      for (Eigen::Index f = 0; f < faces.cols(); ++f)
-      {
-        partner_.add(pointTriangleDistance(place_.position, x.col(faces(0, f)), x.col(faces(1, f)), x.col(faces(2, f))),
-                     quoted("cloth", config_.cloths[k].name));
-      }
-    }
+    return radius;
   }
 
   const Simulation& simulation_;

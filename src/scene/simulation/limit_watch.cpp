@@ -17,14 +17,8 @@ constexpr double kNextRelease = 0.1;     // [s] time after which a lasting excur
 
 const char* limitName(LimitKind kind)
 {
-  switch (kind)
-  {
-    case LimitKind::strain: return "strain";
-    case LimitKind::force: return "force";
-    case LimitKind::torque: return "torque";
-    case LimitKind::speed: return "speed";
-  }
-  return "?";
+  static const char* const names[] = {"strain", "force", "torque", "speed"};
+  return names[static_cast<int>(kind)];
 }
 
 /// Largest distance that one of the points moves [m]. Returns 0 if the numbers of points differ or are 0.

@@ -43,18 +43,26 @@ void takeEntries(const std::vector<int>& same, const std::vector<Value>& from, s
 
 bool isNew(int same) { return same < 0; }
 
-/// A weld of a scene, and the body that holds it. Lists are in the order of WorldModel::welds.
+/// A weld of a scene. Lists are in the order of WorldModel::welds.
 struct BodyWeld
 {
-  int body, index;   ///< indices of the body, and of the weld among the welds of this body
+  int body, index;     ///< indices of the body, and of the weld among the welds of this body
+  int rod;             ///< that it holds
+  std::size_t grasp;   ///< index among the grasps of the rod: welds follow its own grasps, in the order of all welds
 };
 
 std::vector<BodyWeld> weldsOf(const SceneConfig& config)
 {
   std::vector<BodyWeld> welds;
+  std::vector<std::size_t> next;   // per rod
+  for (const RodConfig& rod : config.rods)
+    next.push_back(rod.grasps.size());
   for (int b = 0; b < static_cast<int>(config.bodies.size()); ++b)
     for (int k = 0; k < static_cast<int>(config.bodies[b].welds.size()); ++k)
-      welds.push_back({b, k});
+    {
+      const int rod = config.bodies[b].welds[k].rod;
+      welds.push_back({b, k, rod, next[rod]++});
+    }
   return welds;
 }
 
@@ -126,7 +134,7 @@ std::string StateTransfer::newWelds() const
   for (std::size_t w = 0; w < welds.size(); ++w)
   {
     const BodyConfig& body = to_.bodies[welds[w].body];
-    const int rod = body.welds[static_cast<std::size_t>(welds[w].index)].rod;
+    const int rod = welds[w].rod;
     if (isNew(welds_[w]) && !isNew(rods_[rod]))
       return "body " + body.name + " was welded to rod " + to_.rods[rod].name +
              " while it moved, so that the two do not fit together where the scene starts; ~remove " + body.name +
@@ -175,15 +183,12 @@ bool StateTransfer::isHeldAsBefore(int rod) const
   for (std::size_t g = 0; g < now_.size(); ++g)
     if (now_[g].cloth < 0 && now_[g].rod == rod)
       grasps_now.push_back(grasps_[g]);
-  const auto rodOf = [](const SceneConfig& config, const BodyWeld& weld) {
-    return config.bodies[weld.body].welds[static_cast<std::size_t>(weld.index)].rod;
-  };
   const std::vector<BodyWeld> from = weldsOf(from_), to = weldsOf(to_);
   for (int w = 0; w < static_cast<int>(from.size()); ++w)
-    if (rodOf(from_, from[w]) == rods_[rod])
+    if (from[w].rod == rods_[rod])
       welds_before.push_back(w);
   for (std::size_t w = 0; w < to.size(); ++w)
-    if (rodOf(to_, to[w]) == rod)
+    if (to[w].rod == rod)
       welds_now.push_back(welds_[w]);
   return grasps_before == grasps_now && welds_before == welds_now;
 }
@@ -266,38 +271,24 @@ void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
   takeContacts(bodies_, before.contact.bodies, state.contact.bodies);
   takeContacts(cloths_, before.contact.cloths, state.contact.cloths);
 
-  // The welds of a rod follow its own grasps, in the order of all welds.
-  const auto places = [](const SceneConfig& config) {
-    std::vector<std::pair<int, std::size_t>> all;
-    std::vector<std::size_t> next;
-    for (const RodConfig& rod : config.rods)
-      next.push_back(rod.grasps.size());
-    for (const BodyConfig& body : config.bodies)
-      for (const WeldConfig& weld : body.welds)
-        all.emplace_back(weld.rod, next[weld.rod]++);
-    return all;
-  };
-  const auto from = places(from_), to = places(to_);
+  const std::vector<BodyWeld> from = weldsOf(from_), to = weldsOf(to_);
   for (std::size_t w = 0; w < welds_.size(); ++w)
   {
     if (isNew(welds_[w]))
       continue;
-    const auto& [old_rod, old_grasp] = from[static_cast<std::size_t>(welds_[w])];
-    GraspState& grasp = state.rods[to[w].first].grasps[to[w].second];
+    const BodyWeld& old = from[static_cast<std::size_t>(welds_[w])];
+    GraspState& grasp = state.rods[to[w].rod].grasps[to[w].grasp];
     const int body = grasp.body;
-    grasp = before.rods[old_rod].grasps[old_grasp];
+    grasp = before.rods[old.rod].grasps[old.grasp];
     grasp.body = body;
   }
 }
 
 void StateTransfer::attachNew(SceneGrasps& grasps, double time) const
 {
-  const auto isNewSolid = [this](const std::string& name) {
-    for (std::size_t b = 0; b < bodies_.size(); ++b)
-      if (isNew(bodies_[b]) && to_.bodies[b].name == name)
-        return true;
-    for (std::size_t k = 0; k < obstacles_.size(); ++k)
-      if (isNew(obstacles_[k]) && to_.obstacles[k].name == name)
+  const auto hasNew = [](const auto& solids, const std::vector<int>& same, const std::string& name) {
+    for (std::size_t k = 0; k < same.size(); ++k)
+      if (isNew(same[k]) && solids[k].name == name)
         return true;
     return false;
   };
@@ -307,7 +298,8 @@ void StateTransfer::attachNew(SceneGrasps& grasps, double time) const
     const auto* body = std::get_if<BodyMotion>(&config.motion);
     if (!isNew(grasps_[g]))
     {
-      if (body && isNewSolid(body->body))   // before, no body of the scene had this name
+      if (body && (hasNew(to_.bodies, bodies_, body->body) ||
+                   hasNew(to_.obstacles, obstacles_, body->body)))   // before, no body of the scene had this name
         grasps.takeOffset(g, time);
     }
     else if (!ownerStays(now_[g]))
