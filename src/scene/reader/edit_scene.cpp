@@ -124,20 +124,11 @@ private:
 
 const std::vector<std::string> all_sections{"rods", "threads", "cloths", "tracked", "bodies", "obstacles"};
 
-/// Sets the place that error messages name, so that they refer to the text of the request.
-void setPlace(YamlTree& tree, const std::string& where)
-{
-  tree.origin = where + ":" + std::to_string(std::max(1, tree.line));
-  for (YamlTree& item : tree.items)
-    setPlace(item, where);
-  for (auto& member : tree.members)
-    setPlace(member.second, where);
-}
-
 YamlTree SceneText::parsed(const std::string& text) const
 {
+  // error messages name lines of the text of the request
   YamlTree tree = parseYaml(text, where_);
-  setPlace(tree, where_);
+  forEachValue(tree, [&](YamlTree& value) { value.origin = where_ + ":" + std::to_string(std::max(1, value.line)); });
   return tree;
 }
 
@@ -346,38 +337,28 @@ bool SceneText::dropContact()
   return there;
 }
 
-const char* const edited_mark = " (edited)";
+const std::string edited_mark = " (edited)";
+
+/// The service of each kind of edit, and what it does.
+const std::pair<const char*, void (SceneText::*)(const std::string&)> edits[] = {
+    {"~spawn", &SceneText::spawn},
+    {"~remove", &SceneText::remove},
+    {"~attach", &SceneText::attach},
+    {"~detach", &SceneText::detach},
+    {"~set_parameter", &SceneText::setParameters}};
 
 }   // namespace
 
-const char* toString(SceneEdit::Kind kind)
-{
-  switch (kind)
-  {
-    case SceneEdit::Kind::spawn: return "~spawn";
-    case SceneEdit::Kind::remove: return "~remove";
-    case SceneEdit::Kind::attach: return "~attach";
-    case SceneEdit::Kind::detach: return "~detach";
-    case SceneEdit::Kind::set_parameter: return "~set_parameter";
-  }
-  return "";
-}
+const char* toString(SceneEdit::Kind kind) { return edits[static_cast<int>(kind)].first; }
 
 SceneConfig editedScene(const SceneConfig& scene, const SceneEdit& edit)
 {
   SceneText text(scene, edit);
-  switch (edit.kind)
-  {
-    case SceneEdit::Kind::spawn: text.spawn(edit.text); break;
-    case SceneEdit::Kind::remove: text.remove(edit.text); break;
-    case SceneEdit::Kind::attach: text.attach(edit.text); break;
-    case SceneEdit::Kind::detach: text.detach(edit.text); break;
-    case SceneEdit::Kind::set_parameter: text.setParameters(edit.text); break;
-  }
+  (text.*edits[static_cast<int>(edit.kind)].second)(edit.text);
   // Error messages count lines in the edited text, not in the file, so the name of the file is marked.
-  const bool edited_before = scene.file.size() > std::char_traits<char>::length(edited_mark) &&
-                             scene.file.compare(scene.file.size() - std::char_traits<char>::length(edited_mark),
-                                                std::string::npos, edited_mark) == 0;
+  const bool edited_before =
+      scene.file.size() > edited_mark.size() &&
+      scene.file.compare(scene.file.size() - edited_mark.size(), std::string::npos, edited_mark) == 0;
   const std::string file = scene.file + (edited_before ? "" : edited_mark);
   SceneConfig edited;
   try

@@ -4,7 +4,8 @@
 #include <cctype>
 #include <functional>
 #include <limits>
-#include <sstream>
+
+#include "yaml_tree.h"
 
 namespace slender {
 
@@ -18,19 +19,18 @@ std::string parentOf(const std::string& path)
   return dot == std::string::npos ? "" : path.substr(0, dot);
 }
 
-bool isPlace(const std::string& part)
+}   // namespace
+
+bool isPlaceInList(const std::string& part)
 {
   return !part.empty() && std::all_of(part.begin(), part.end(), [](unsigned char c) { return std::isdigit(c); });
 }
-
-}   // namespace
 
 std::string KeyLog::general(const std::string& path, bool& own) const
 {
   own = true;
   std::string result;
-  std::istringstream parts(path);
-  for (std::string part; std::getline(parts, part, '.');)
+  for (const std::string& part : path.empty() ? std::vector<std::string>() : splitPath(path))
   {
     const auto owner = shared_.find(result);
     if (owner != shared_.end())
@@ -38,7 +38,7 @@ std::string KeyLog::general(const std::string& path, bool& own) const
       result = owner->second;
       own = false;
     }
-    result = joined(result, named_.count(result) ? "NAME" : isPlace(part) ? "N" : part);
+    result = joined(result, named_.count(result) ? "NAME" : isPlaceInList(part) ? "N" : part);
   }
   return result;
 }

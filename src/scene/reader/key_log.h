@@ -8,6 +8,9 @@
 
 namespace slender {
 
+/// Whether a part of a path is a place in a list: a number.
+bool isPlaceInList(const std::string& part);
+
 /// The keys that readers ask for, in the order of the first question. Places in lists and names that the user gives are
 /// put as N and NAME. Keys that several sections share stand where their owner has them.
 class KeyLog

@@ -16,15 +16,6 @@ namespace slender {
 
 namespace {
 
-std::vector<std::string> partsOf(const std::string& path)
-{
-  std::vector<std::string> parts;
-  std::istringstream in(path);
-  for (std::string part; std::getline(in, part, '.');)
-    parts.push_back(part);
-  return parts;
-}
-
 bool isBelow(const std::string& path, const std::string& section)
 {
   return path.size() > section.size() && path.compare(0, section.size(), section) == 0 && path[section.size()] == '.';
@@ -81,7 +72,7 @@ public:
     constexpr std::ptrdiff_t many = 8;
     for (const SceneKey& key : keys)
     {
-      const std::size_t depth = partsOf(key.path).size();
+      const std::size_t depth = splitPath(key.path).size();
       const bool in_list = key.path.find(".N.") != std::string::npos || key.path.find(".NAME.") != std::string::npos;
       if (depth > 1 && in_list && keysBelow(keys, key.path) >= many &&
           headingOf(key.path).find('.') == std::string::npos)
@@ -183,16 +174,14 @@ private:
 /// Whether a part of a query stands for a part of a key's path: the same word, a place in a list, or a user's name.
 bool fits(const std::string& part, const std::string& asked)
 {
-  const bool is_place =
-      !asked.empty() && std::all_of(asked.begin(), asked.end(), [](unsigned char c) { return std::isdigit(c); });
-  return part == asked || part == "NAME" || (part == "N" && is_place);
+  return part == asked || part == "NAME" || (part == "N" && isPlaceInList(asked));
 }
 
 /// The path of the key that a query names, where it is described; empty: none.
 std::string resolved(const std::vector<SceneKey>& keys, const std::string& query)
 {
   std::set<std::string> at = {""};
-  for (const std::string& asked : partsOf(query))
+  for (const std::string& asked : splitPath(query))
   {
     std::set<std::string> next;
     for (const std::string& path : at)
@@ -279,11 +268,11 @@ std::string describeKeys(const std::vector<SceneKey>& keys, const std::string& q
   const std::string path = resolved(keys, query);
   for (const SceneKey& key : keys)
   {
-    const std::vector<std::string> parts = partsOf(key.path);
+    const std::vector<std::string> parts = splitPath(key.path);
     const bool named = path.empty() ? std::find(parts.begin(), parts.end(), query) != parts.end()
                                     : key.path == path || isBelow(key.path, path);
     // a word that is a section as well as a key elsewhere: both
-    const bool elsewhere = query.find('.') == std::string::npos && !parts.empty() && parts.back() == query;
+    const bool elsewhere = query.find('.') == std::string::npos && parts.back() == query;
     if (named || elsewhere)
       text += (text.empty() ? "" : "\n") + described(keys, key);
   }
@@ -294,7 +283,7 @@ std::string nearestKey(const std::vector<SceneKey>& keys, const std::string& que
 {
   std::vector<std::string> words;
   for (const SceneKey& key : keys)
-    for (const std::string& part : partsOf(key.path))
+    for (const std::string& part : splitPath(key.path))
       if (part != "N" && part != "NAME")
         words.push_back(part);
   return nearestWord(query.substr(query.rfind('.') + 1), words);

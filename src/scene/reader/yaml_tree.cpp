@@ -177,14 +177,11 @@ void emit(YAML::Emitter& out, const YamlTree& tree)
   }
 }
 
-void setOrigin(YamlTree& tree, const std::string& origin)
+/// The name of an entry of a list; null if it has none.
+const std::string* nameOf(const YamlTree& entry)
 {
-  tree.origin = origin;
-  tree.line = 0;
-  for (YamlTree& item : tree.items)
-    setOrigin(item, origin);
-  for (auto& member : tree.members)
-    setOrigin(member.second, origin);
+  const YamlTree* name = entry.find("name");
+  return name && name->kind == YamlTree::Kind::scalar ? &name->scalar : nullptr;
 }
 
 /// " (0 is rope, 1 is cable)", for a list whose entries have names; of long lists the first ones.
@@ -193,11 +190,8 @@ std::string placesByName(const YamlTree& list)
   constexpr std::size_t most = 10;
   std::string text;
   for (std::size_t k = 0; k < list.items.size() && k < most; ++k)
-  {
-    const YamlTree* name = list.items[k].kind == YamlTree::Kind::map ? list.items[k].find("name") : nullptr;
-    if (name && name->kind == YamlTree::Kind::scalar)
-      text += (text.empty() ? " (" : ", ") + std::to_string(k) + " is " + name->scalar;
-  }
+    if (const std::string* name = nameOf(list.items[k]))
+      text += (text.empty() ? " (" : ", ") + std::to_string(k) + " is " + *name;
   return text.empty() ? text : text + ")";
 }
 
@@ -205,11 +199,8 @@ std::string placesByName(const YamlTree& list)
 std::optional<double> placeIn(const YamlTree& list, const std::string& part)
 {
   for (std::size_t k = 0; k < list.items.size(); ++k)
-  {
-    const YamlTree* name = list.items[k].find("name");
-    if (name && name->kind == YamlTree::Kind::scalar && name->scalar == part)
+    if (const std::string* name = nameOf(list.items[k]); name && *name == part)
       return static_cast<double>(k);
-  }
   return parseNumber(part);
 }
 
@@ -232,14 +223,8 @@ void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::
 
 const char* toString(YamlTree::Kind kind)
 {
-  switch (kind)
-  {
-    case YamlTree::Kind::null: return "nothing";
-    case YamlTree::Kind::scalar: return "a single value";
-    case YamlTree::Kind::list: return "a list";
-    case YamlTree::Kind::map: return "a map";
-  }
-  return "";
+  static const char* const words[] = {"nothing", "a single value", "a list", "a map"};
+  return words[static_cast<int>(kind)];
 }
 
 const YamlTree* YamlTree::find(const std::string& key) const
@@ -300,7 +285,10 @@ void applyOverride(YamlTree& root, const std::string& assignment, const std::str
   if (equals == std::string::npos || equals == 0)
     throw SceneError(where + ": must be PATH=VALUE, for example rods.0.material.youngs_modulus=1e7");
   YamlTree value = parseYaml(assignment.substr(equals + 1), where);
-  setOrigin(value, where);
+  forEachValue(value, [&](YamlTree& part) {
+    part.origin = where;
+    part.line = 0;
+  });
 
   YamlTree* at = &root;
   std::string passed;

@@ -31,6 +31,17 @@ struct YamlTree
 
 const char* toString(YamlTree::Kind kind);
 
+/// Calls an action with a value and with all values in it.
+template <class Action>
+void forEachValue(YamlTree& tree, const Action& action)
+{
+  action(tree);
+  for (YamlTree& item : tree.items)
+    forEachValue(item, action);
+  for (auto& member : tree.members)
+    forEachValue(member.second, action);
+}
+
 /// Parses one document. Throws SceneError "FILE:LINE: reason".
 YamlTree parseYaml(const std::string& text, const std::string& file);
 
