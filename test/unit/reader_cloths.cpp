@@ -133,7 +133,7 @@ TEST(ClothReader, NamesWhatIsWrong)
     EXPECT_NE(problemsOf(towel, {assignment}).find(expected), std::string::npos)
         << assignment << "\ngave: " << problemsOf(towel, {assignment});
   }
-  EXPECT_NE(problemsOf(towel, {"rods=[{grasps: {left: {edges: [0]}}}]"}).find("same name as a grasp of rod"),
+  EXPECT_NE(problemsOf(towel, {"rods=[{grasps: {left: {edges: [0]}}}]"}).find("same name as rods.0.grasps.left"),
             std::string::npos);
   EXPECT_NE(problemsOf(towel, {"bodies=[{name: hand, mass: 1, inertia: [1, 1, 1]}]",
                                "cloths.0.grasps.left.motion={body: hand}"})

@@ -90,13 +90,12 @@ std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadR
   const auto name = at_rod.text();
   if (!name)
     return std::nullopt;
-  const auto found =
-      std::find_if(rods.begin(), rods.end(), [&](const ReadRod& part) { return part.config.name == *name; });
+  const auto found = std::find_if(rods.begin(), rods.end(), [&](const ReadRod& rod) { return rod.name == *name; });
   if (found == rods.end())
   {
     std::vector<std::string> names;
-    for (const ReadRod& part : rods)
-      names.push_back(part.config.name);
+    for (const ReadRod& rod : rods)
+      names.push_back(rod.name);
     return at_rod.problem("is no rod of the scene" + didYouMean(*name, names) + "; it has: " + joinWords(names, 10));
   }
   const int edges = found->edges;
@@ -106,7 +105,7 @@ std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadR
     return std::nullopt;
   const std::size_t before = edge.problems().size();
   const int held = *index < 0 ? *index + edges : *index;
-  const auto [first, last] = nodesOfEdges(edge, held, held, found->config.closed, edges);
+  const auto [first, last] = nodesOfEdges(edge, held, held, found->closed, edges);
   return edge.problems().size() == before
              ? std::optional<WeldConfig>({static_cast<int>(found - rods.begin()), first, last})
              : std::nullopt;
@@ -178,10 +177,10 @@ void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<R
   const auto overlaps = [&](int first, int last) { return weld.first_node <= last && first <= weld.last_node; };
   const auto report = [&](const std::string& other, int first, int last) {
     at.problem("holds nodes " + std::to_string(weld.first_node) + " to " + std::to_string(weld.last_node) + " of rod " +
-               rods[weld.rod].config.name + "; " + other + " holds nodes " + std::to_string(first) + " to " +
+               rods[weld.rod].name + "; " + other + " holds nodes " + std::to_string(first) + " to " +
                std::to_string(last));
   };
-  for (const GraspConfig& grasp : rods[weld.rod].config.grasps)
+  for (const GraspConfig& grasp : rods[weld.rod].grasps)
     if (overlaps(grasp.first_node, grasp.last_node))
       return report("grasp " + grasp.name, grasp.first_node, grasp.last_node);
   for (const BodyConfig& body : bodies)

@@ -68,20 +68,19 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
   YamlMap material(
       map.get("material", "Mass and stiffness of the cloth. Without the key: the defaults of the keys in it.")
           .sharesKeysOf("cloths.N.material"));
-  const YamlCursor per_area = material.get("area_density", "Mass per area. Without the key: 0.15 kg/m^2.");
+  const YamlCursor per_area = material.get("area_density", cloth.area_density, Range::above(0, 1e4, "kg/m^2"),
+                                           "Mass per area. Without the key: 0.15 kg/m^2.");
   const YamlCursor per_volume =
       material.get("density", "Mass per volume, which is multiplied by `thickness`; in place of `area_density`.");
-  const YamlCursor modulus =
-      material.get("youngs_modulus", "Young's modulus E. Without the key: 1e6 Pa. Not beside `membrane`.");
+  const YamlCursor modulus = material.get("youngs_modulus", youngs_modulus, Range::above(0, 1e13, "Pa"),
+                                          "Young's modulus E. Without the key: 1e6 Pa. Not beside `membrane`.");
   material.get("thickness", thickness, Range::above(0, 1, "m"),
                "Thickness h of the cloth, for its stiffness and mass; contact has a thickness of its own. Without the "
                "key: 0.0003 m.");
-  assign(cloth.area_density, per_area.number(Range::above(0, 1e4, "kg/m^2")));
   if (const auto density = per_volume.number(Range::above(0, 1e6, "kg/m^3")))
     cloth.area_density = *density * thickness;
   if (per_area.present() && per_volume.present())
     per_volume.problem("there is an area_density as well; give one of them");
-  assign(youngs_modulus, modulus.number(Range::above(0, 1e13, "Pa")));
   const YamlCursor ratio = material.get("poissons_ratio", poissons_ratio, Range::above(-1, 0.5),
                                         "Poisson's ratio. Without the key: 0.3. Not beside `membrane`.");
   material.finish();
@@ -104,10 +103,9 @@ void readMaterials(YamlMap& map, ClothConfig& cloth)
   const YamlCursor bending_modulus = bending.get("modulus",
                                                  "Bending stiffness D, moment per width and curvature. Without the "
                                                  "key: E h^3 / (12 (1 - nu^2)), 0 with model none.");
-  const YamlCursor bending_ratio = bending.get("poissons_ratio",
+  const YamlCursor bending_ratio = bending.get("poissons_ratio", cloth.bending_poissons_ratio, Range::between(-1, 1),
                                                "Poisson's ratio of bending, for model isometric. Without the key: that "
                                                "of the mesh, about -1/3 on equilateral triangles.");
-  cloth.bending_poissons_ratio = bending_ratio.number(Range::between(-1, 1));
   bending.finish();
   if (bending_ratio.present() && cloth.bending != BendingModel::isometric_nonconforming)
   {

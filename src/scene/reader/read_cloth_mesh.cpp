@@ -1,6 +1,7 @@
 #include "read_cloth_mesh.h"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/geometry/mesh_file.h"
@@ -81,8 +82,9 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
       "Vectors from the lower left corner to the lower right and to the upper left corner; they are at right angles.");
   const YamlCursor at_cells = map.require(
       "cells", "Number of cells along both sides: [columns, rows], or columns alone, from which the rows follow.");
-  const YamlCursor at_seed =
-      map.get("seed", "Seed of the random positions of `pattern: irregular`. Without the key: 1.");
+  int seed = 1;
+  const YamlCursor at_seed = map.get("seed", seed, Range::closed(0, 2'000'000'000),
+                                     "Seed of the random positions of `pattern: irregular`. Without the key: 1.");
   bool good = readSides(at_sides, grid);
   const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
   int columns = 0, rows = 0;
@@ -116,8 +118,6 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
            {"irregular", GridPattern::irregular}},
           "How the rectangle is divided into triangles; bending depends on the pattern. Vertices are numbered from the "
           "corner along the first side, row after row. Without the key: equilateral.");
-  int seed = 1;
-  assign(seed, at_seed.integer(0, 2'000'000'000));
   if (at_seed.present() && pattern != GridPattern::irregular)
     at_seed.problem("is for pattern: irregular");
   if (!good || !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
@@ -145,46 +145,35 @@ Eigen::Matrix3Xd readClothShape(const YamlCursor& at, const ReadContext& context
   if (!read || cloth.vertices.cols() == 0)
     return {};   // none, or reported
   const TriangleMesh& mesh = read->mesh;
-  const std::string& path = read->path;
-  const YamlCursor file = at.find("file");
-  const auto differs = [&](const std::string& what, Eigen::Index here, Eigen::Index there) {
-    file.problem(path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " +
-                 std::to_string(there) + "; both must have the same triangles of the same vertices, in the same order");
-  };
-  if (mesh.vertices.cols() != cloth.vertices.cols())
-  {
-    differs("vertices", mesh.vertices.cols(), cloth.vertices.cols());
-    return {};
-  }
-  if (mesh.triangles.cols() != cloth.triangles.cols())
-  {
-    differs("triangles", mesh.triangles.cols(), cloth.triangles.cols());
-    return {};
-  }
-  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
-  {
-    const Eigen::Vector3i here = mesh.triangles.col(f), there = cloth.triangles.col(f);
+  const std::string same = "; both must have the same triangles of the same vertices, in the same order";
+  const auto requireSame = [&](const char* what, Eigen::Index here, Eigen::Index there) {
     if (here != there)
     {
-      const auto text = [](const Eigen::Vector3i& t) {
-        return std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]);
-      };
-      file.problem(path + ": triangle " + std::to_string(f) + " has the vertices " + text(here) +
-                   " (from 0), that of the cloth's mesh " + text(there) +
-                   "; both must have the same triangles of the same vertices, in the same order");
-      return {};
+      throw std::runtime_error(read->path + " has " + std::to_string(here) + " " + what + ", the cloth's mesh has " +
+                               std::to_string(there) + same);
     }
-  }
-  // unlike a cloth's mesh it may touch itself
-  for (const MeshDefect& defect : meshDefects(mesh))
-  {
-    if (defect.kind == MeshDefect::degenerate_face)
+  };
+  const auto corners = [](const TriangleMesh& of, Eigen::Index face) {
+    const Eigen::Vector3i t = of.triangles.col(face);
+    return std::to_string(t[0]) + " " + std::to_string(t[1]) + " " + std::to_string(t[2]);
+  };
+  const bool good = at.find("file").attempt([&] {
+    requireSame("vertices", mesh.vertices.cols(), cloth.vertices.cols());
+    requireSame("triangles", mesh.triangles.cols(), cloth.triangles.cols());
+    for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
     {
-      file.problem(path + ": " + defect.message);
-      return {};
+      if (mesh.triangles.col(f) != cloth.triangles.col(f))
+      {
+        throw std::runtime_error(read->path + ": triangle " + std::to_string(f) + " has the vertices " +
+                                 corners(mesh, f) + " (from 0), that of the cloth's mesh " + corners(cloth, f) + same);
+      }
     }
-  }
-  return mesh.vertices;
+    // unlike a cloth's mesh it may touch itself
+    for (const MeshDefect& defect : meshDefects(mesh))
+      if (defect.kind == MeshDefect::degenerate_face)
+        throw std::runtime_error(read->path + ": " + defect.message);
+  });
+  return good ? mesh.vertices : Eigen::Matrix3Xd();
 }
 
 }   // namespace slender

@@ -91,9 +91,8 @@ void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod);
 Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// A rod, and how many edges it has: 0 when its centreline could not be read.
-struct ReadRod
+struct ReadRod : RodConfig
 {
-  RodConfig config;
   int edges = 0;
 };
 /// What rods of a scene and those of a generator have in common: curvature, formulation, material, damping, contact.
@@ -148,9 +147,7 @@ std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& con
 /// The list `tracked`: appends to the cloths.
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
 /// The contact methods of the cloths have been chosen.
-ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
-                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths,
-                          const std::vector<BodyConfig>& bodies);
+ContactConfig readContact(const YamlCursor& at, const SceneConfig& scene);
 std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
 /// Reads robots. Returns the obstacles for their collision shapes, each with the entry of its robot.
 std::vector<std::pair<ObstacleConfig, YamlCursor>> readRobots(const YamlCursor& at, const ReadContext& context);

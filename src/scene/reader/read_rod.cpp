@@ -100,33 +100,24 @@ int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
               "other edges follow without twist. Without the key some normal is chosen.");
   if (map.at().problems().size() != before)
     return 0;
-  try
-  {
+  int edges = 0;
+  const bool good = (centerline.present() ? centerline : map.at()).attempt([&] {
     const Eigen::Matrix3Xd rest = restNodes(rod, context.gravity);
-    const int edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
+    edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
     if (rest.cols() < 3)
-    {
-      centerline.problem("makes " + std::to_string(edges) + " edges; a rod needs at least 2 (closed: 3)");
-      return 0;
-    }
+      throw std::invalid_argument("makes " + std::to_string(edges) + " edges; a rod needs at least 2 (closed: 3)");
     const Eigen::VectorXd lengths = edgeLengths(rest, rod.closed);
     Eigen::Index shortest = 0;
     if (!(lengths.minCoeff(&shortest) > 1e-12 * lengths.maxCoeff()))
     {
-      centerline.problem("nodes " + std::to_string(shortest) + " and " + std::to_string(shortest + 1) +
-                         " are at the same place; must differ");
-      return 0;
+      throw std::invalid_argument("nodes " + std::to_string(shortest) + " and " + std::to_string(shortest + 1) +
+                                  " are at the same place; must differ");
     }
     const Eigen::Vector3d tangent = rest.col(1) - rest.col(0);
     if (rod.director.norm() > 0 && rod.director.cross(tangent).norm() < 1e-6 * rod.director.norm() * tangent.norm())
       director.problem("is along the first edge; must point away from it");
-    return edges;
-  }
-  catch (const std::invalid_argument& error)
-  {
-    (centerline.present() ? centerline : map.at()).problem(error.what());
-    return 0;
-  }
+  });
+  return good ? edges : 0;
 }
 
 /// `rest_twist` and `natural_curvature` of a rod with so many edges (0: not known).
@@ -370,6 +361,7 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
   RodConfig rod;
   YamlMap map(at);
   rod.name = default_name;
+  rod.place = at.place();
   map.getName(rod.name,
               "Name of the rod, which topics, tables and other keys use. Without the key: rod if there is one rod, "
               "otherwise rod0, rod1, ...");

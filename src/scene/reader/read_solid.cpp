@@ -205,23 +205,21 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
   return contact;
 }
 
-ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods,
-                          const std::vector<ThreadConfig>& threads, const std::vector<ClothConfig>& cloths,
-                          const std::vector<BodyConfig>& bodies)
+ContactConfig readContact(const YamlCursor& at, const SceneConfig& scene)
 {
   ContactConfig contact;
   YamlMap map(at);
   double smallest = std::numeric_limits<double>::infinity();
-  for (const ReadRod& rod : rods)
+  for (const RodConfig& rod : scene.rods)
   {
-    if (rod.config.contact)
+    if (rod.contact)
     {
-      for (const auto* radii : {&rod.config.cross_section.a, &rod.config.cross_section.b})
+      for (const auto* radii : {&rod.cross_section.a, &rod.cross_section.b})
         for (double radius : *radii)
           smallest = std::min(smallest, radius);
     }
   }
-  for (const ThreadConfig& thread : threads)
+  for (const ThreadConfig& thread : scene.threads)
   {
     if (thread.contact)
     {
@@ -232,11 +230,11 @@ ContactConfig readContact(const YamlCursor& at, const std::vector<ReadRod>& rods
     }
   }
   double gap = 0.1 * smallest;
-  for (const ClothConfig& cloth : cloths)
+  for (const ClothConfig& cloth : scene.cloths)
     if (cloth.contact && cloth.contact->method == ContactMethod::barrier)
       gap = std::min(gap, 0.5 * cloth.contact->thickness);
   if (!std::isfinite(gap))   // bodies alone
-    for (const BodyConfig& body : bodies)
+    for (const BodyConfig& body : scene.bodies)
       if (body.contact && body.shape && !body.motion)
         gap = std::min(gap, 5e-3 * boundingRadius(*body.shape));
   const bool any = std::isfinite(gap);

@@ -40,13 +40,12 @@ RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
   RodLoadConfig load;
   YamlMap map(at);
   readLoadPlace(map, closed, edges, load);
-  const YamlCursor force =
-      map.get("force", "Force that keeps its size and its direction in the world. Without the key: none.");
+  const YamlCursor force = map.get("force", load.force, Range::closed(-1e15, 1e15, "N"),
+                                   "Force that keeps its size and its direction in the world. Without the key: none.");
   const YamlCursor torque =
       map.get("torque",
               "Torque about the tangent of the rod, right-handed about the direction from the first node to the last. "
               "A bending moment is a couple of forces instead. Without the key: none.");
-  assign(load.force, force.vector3(Range::closed(-1e15, 1e15, "N")));
   if (torque.isList())
   {
     torque.problem(
@@ -156,8 +155,8 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
   const YamlCursor path = map.get("path",
                                   "Equilibria, stable or not, that are followed while the load factor grows, also "
                                   "through folds. For scenes of one rod without contact, bodies and cloth.");
-  const YamlCursor perturbation = map.get(
-      "perturbation",
+  map.get(
+      "perturbation", statics.perturbation, Range::closed(-1, 1),
       "Imperfection that rounds branch points off: forces along the lowest mode of the first equilibrium, whose sizes "
       "sum to this share of the scaled loads. A negative number pushes to the other side. Without the key: 0.");
   if (const auto values = factors.numbers(factor_range))
@@ -173,7 +172,6 @@ std::optional<StaticsConfig> readStatics(const YamlCursor& at)
           {{"all", FactorScales::all}, {"gravity", FactorScales::gravity}, {"loads", FactorScales::loads}},
           "Which loads the load factor multiplies: gravity, the `loads` of rods and cloths, or both. Without the key: "
           "all.");
-  assign(statics.perturbation, perturbation.number(Range::closed(-1, 1)));
   statics.buckling =
       readBuckling(map.get("buckling",
                            "Whether the critical load factor is found: the smallest at which the equilibrium stops "

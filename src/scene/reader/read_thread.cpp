@@ -144,10 +144,9 @@ FloorConfig readFloor(const YamlCursor& at)
   const YamlCursor on_surface =
       map.get("centreline_on_surface", floor.on_surface,
               "Whether the centreline comes to lie on the floor, instead of one radius above. Without the key: false.");
-  const YamlCursor friction = map.get("friction",
-                                      "Coefficient of friction with which the thread slips on the floor; the thread "
-                                      "needs `contact`. Without the key the thread sticks to the floor.");
-  floor.friction = friction.number(Range::closed(0, 100, "[-]"));
+  map.get("friction", floor.friction, Range::closed(0, 100, "[-]"),
+          "Coefficient of friction with which the thread slips on the floor; the thread "
+          "needs `contact`. Without the key the thread sticks to the floor.");
   if (floor.friction && floor.on_surface)
     on_surface.problem("is for floors that the thread sticks to, without floor.friction");
   return floor;

@@ -32,15 +32,11 @@ TimeConfig readTime(const YamlCursor& at)
               "ones are taken where they are needed. Without the key, or with 0, steps have a fixed length.");
   if (time.error_tolerance > 0 && isExplicit(time.integrator))
     error_tolerance.problem("is for implicit integrators; steps of symplectic_euler and imex are of fixed length");
-  const YamlCursor min_step = map.get("min_step",
+  const YamlCursor min_step = map.get("min_step", time.min_step, Range::above(0, 10, "s"),
                                       "Shortest step to which the error control and halving may go. Without the key: "
                                       "1e-7 s, or `time.step` if that is shorter.");
-  if (const auto value = min_step.number(Range::above(0, 10, "s")))
-  {
-    time.min_step = *value;
-    if (*value > time.step)
-      min_step.problem("is longer than time.step; must be in (0, " + shortNumber(time.step) + "] s");
-  }
+  if (min_step.present() && time.min_step > time.step)
+    min_step.problem("is longer than time.step; must be in (0, " + shortNumber(time.step) + "] s");
   time.min_step = std::min(time.min_step, time.step);
   YamlMap newton(map.get("newton", "Settings of the solver of implicit steps (Newton's method)."));
   newton.get("tolerance", time.newton.tolerance, Range::between(1e-14, 1e-1),

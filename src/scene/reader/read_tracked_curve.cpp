@@ -84,27 +84,27 @@ GuideNodes readNodes(YamlMap& map, const ReadContext& context, const TrackedCurv
   }
   const std::size_t before = map.at().problems().size();
   const std::vector<Eigen::Vector3d> given = readPoints(points, file, context);
-  const YamlCursor& from = points.present() ? points : file;
   if (map.at().problems().size() != before)
     return guide;
-  if (static_cast<int>(given.size()) < fewest)
-  {
-    from.problem("has " + std::to_string(given.size()) + " points; a guide" + (rod.closed ? " of a closed rod" : "") +
-                 " needs at least " + std::to_string(fewest));
-    return guide;
-  }
-  Eigen::Matrix3Xd matrix =
-      Eigen::Map<const Eigen::Matrix3Xd>(given[0].data(), 3, static_cast<Eigen::Index>(given.size()));
-  const Eigen::VectorXd lengths = edgeLengths(matrix, rod.closed);
-  Eigen::Index shortest = 0;
-  if (!(lengths.minCoeff(&shortest) > 1e-9 * lengths.sum()))
-  {
-    from.problem("points " + std::to_string(shortest) + " and " + std::to_string((shortest + 1) % lengths.size()) +
-                 " are at the same place; must differ");
-    return guide;
-  }
-  guide.nodes = std::move(matrix);
-  guide.shares = lengthFractions(lengths);
+  (points.present() ? points : file).attempt([&] {
+    if (static_cast<int>(given.size()) < fewest)
+    {
+      throw std::invalid_argument("has " + std::to_string(given.size()) + " points; a guide" +
+                                  (rod.closed ? " of a closed rod" : "") + " needs at least " + std::to_string(fewest));
+    }
+    const Eigen::Matrix3Xd nodes_given =
+        Eigen::Map<const Eigen::Matrix3Xd>(given[0].data(), 3, static_cast<Eigen::Index>(given.size()));
+    const Eigen::VectorXd lengths = edgeLengths(nodes_given, rod.closed);
+    Eigen::Index shortest = 0;
+    if (!(lengths.minCoeff(&shortest) > 1e-9 * lengths.sum()))
+    {
+      throw std::invalid_argument("points " + std::to_string(shortest) + " and " +
+                                  std::to_string((shortest + 1) % lengths.size()) +
+                                  " are at the same place; must differ");
+    }
+    guide.nodes = nodes_given;
+    guide.shares = lengthFractions(lengths);
+  });
   return guide;
 }
 

@@ -21,23 +21,8 @@ constexpr std::uintmax_t max_file_size = 256u << 20;   // [bytes]
 
 std::vector<ReadRod> readRods(const YamlCursor& at, const ReadContext& context)
 {
-  std::map<std::string, std::string> names, grasp_names;   // to the path that used it first
-  return readEach<ReadRod>(at, 1, 100'000, "rod", [&](const YamlCursor& entry, const std::string& default_name) {
-    ReadRod rod = readRod(entry, context, default_name);
-    rod.config.place = entry.place();
-    takeName(names, entry, rod.config.name);
-    for (const GraspConfig& grasp : rod.config.grasps)
-    {
-      const std::string path = entry.path() + ".grasps." + grasp.name;
-      const auto [other, new_grasp] = grasp_names.emplace(grasp.name, path);
-      if (!new_grasp)
-      {
-        entry.find("grasps")
-            .find(grasp.name)
-            .problem("has the same name as " + other->second + "; grasps of a scene need different names");
-      }
-    }
-    return rod;
+  return readNamed<ReadRod>(at, 100'000, "rod", [&](const YamlCursor& entry, const std::string& default_name) {
+    return readRod(entry, context, default_name);
   });
 }
 
@@ -54,20 +39,20 @@ void takeGeneratedRods(Generated& generated, std::vector<ReadRod>& rods)
     }
     return true;
   };
-  for (const ReadRod& part : rods)
+  for (const ReadRod& rod : rods)
   {
-    take(names, "rod", part.config.name, nullptr);
-    for (const GraspConfig& grasp : part.config.grasps)
+    take(names, "rod", rod.name, nullptr);
+    for (const GraspConfig& grasp : rod.grasps)
       take(grasps, "grasp", grasp.name, nullptr);
   }
   bool good = true;   // one generator repeats itself thousands of times
-  for (auto& [part, maker] : generated.rods)
+  for (auto& [rod, maker] : generated.rods)
   {
-    good = good && take(names, "rod", part.config.name, &maker);
-    for (const GraspConfig& grasp : part.config.grasps)
+    good = good && take(names, "rod", rod.name, &maker);
+    for (const GraspConfig& grasp : rod.grasps)
       good = good && take(grasps, "grasp", grasp.name, &maker);
-    part.config.place = maker.place();
-    rods.push_back(std::move(part));
+    rod.place = maker.place();
+    rods.push_back(std::move(rod));
   }
 }
 
@@ -140,11 +125,12 @@ std::string whyNoBarrier(const SceneConfig& scene, std::size_t k)
 
 /// Sets the method of contact of each cloth that does not name one. Impulses are cheap, but let cloth meet nothing else
 /// than cloth and what moves as prescribed.
-void chooseContactMethods(const std::vector<YamlCursor>& cloths, const std::vector<ReadRod>& rods, SceneConfig& scene)
+void chooseContactMethods(const std::vector<YamlCursor>& cloths, SceneConfig& scene)
 {
   const auto method = [&](std::size_t k) { return cloths[k].find("contact").find("method"); };
-  bool others =
-      std::any_of(rods.begin(), rods.end(), [](const ReadRod& rod) { return rod.config.contact.has_value(); });
+  bool others = false;
+  for (const RodConfig& rod : scene.rods)
+    others = others || rod.contact;
   for (const ThreadConfig& thread : scene.threads)
     others = others || thread.contact;
   for (const BodyConfig& body : scene.bodies)
@@ -186,27 +172,26 @@ void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cl
   }
 }
 
-/// Grasps of rods and of cloths are entries of one list of topics.
-void checkGraspNames(const SceneConfig& scene, const std::vector<YamlCursor>& cloths)
+/// Grasps of rods and of cloths are entries of one list of topics. Names of generated grasps have been compared with
+/// those of the rods.
+void checkGraspNames(const SceneConfig& scene, const std::vector<ListedGrasp>& grasps)
 {
-  std::map<std::string, std::string> owners;   // to the rod or cloth that has it
-  for (const RodConfig& rod : scene.rods)
-    for (const GraspConfig& grasp : rod.grasps)
-      owners.emplace(grasp.name, rod.name);
-  for (std::size_t k = 0; k < cloths.size(); ++k)
-  {
-    for (const GraspConfig& grasp : scene.cloths[k].grasps)
+  std::map<std::string, std::string> owners;   // to what used the name first
+  const auto check = [&](bool of_cloth) {
+    for (const ListedGrasp& grasp : grasps)
     {
-      const auto [other, is_new] = owners.emplace(grasp.name, scene.cloths[k].name);
+      if (grasp.of_cloth != of_cloth)
+        continue;
+      const auto [other, is_new] = owners.emplace(grasp.config.name, grasp.at.path());
       if (!is_new)
-      {
-        cloths[k]
-            .find("grasps")
-            .find(grasp.name)
-            .problem("has the same name as a grasp of " + other->second + "; grasps of a scene need different names");
-      }
+        grasp.at.problem("has the same name as " + other->second + "; grasps of a scene need different names");
     }
-  }
+  };
+  check(false);
+  for (const RodConfig& rod : scene.rods)   // generated ones
+    for (const GraspConfig& grasp : rod.grasps)
+      owners.emplace(grasp.name, "a grasp of " + rod.name);
+  check(true);
 }
 
 /// All that has a place in space.
@@ -273,15 +258,15 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     takeSolid(maker, body.name, true);
     scene.bodies.push_back(std::move(body));
   }
-  chooseContactMethods(cloths, rods, scene);
-  scene.contact = readContact(at_contact, rods, scene.threads, scene.cloths, scene.bodies);
-  for (ReadRod& part : rods)
-    scene.rods.push_back(std::move(part.config));
+  for (ReadRod& rod : rods)
+    scene.rods.push_back(std::move(rod));
+  chooseContactMethods(cloths, scene);
+  scene.contact = readContact(at_contact, scene);
   completeThreads(scene, entriesOf(at_threads));
   const std::vector<ListedGrasp> grasps = listedGrasps(scene, entriesOf(at_rods), cloths);
   checkFollowed(scene, grasps);
   checkIgnoredContacts(scene, grasps);
-  checkGraspNames(scene, cloths);
+  checkGraspNames(scene, grasps);
   checkUnderCloth(scene, cloths);
 }
 

@@ -21,11 +21,11 @@ constexpr long max_points = 1'000'000;
 std::vector<std::string> readSeries(const YamlCursor& at)
 {
   YamlMap map(at);
-  const YamlCursor log_at = map.get("log", "Whether the values form a geometric series. Without the key: false.");
+  bool log = false;
+  map.get("log", log, "Whether the values form a geometric series. Without the key: false.");
   const YamlCursor from_at = map.require("from", "First value of the series.");
   const auto from = from_at.number({}), to = map.require("to", "Last value of the series.").number({});
   const auto count = map.require("count", "Number of values.").integer(2, max_points);
-  const bool log = log_at.boolean().value_or(false);
   std::vector<std::string> values;
   if (!from || !to || !count)
     return values;
@@ -67,7 +67,7 @@ SweepPlot readPlot(const YamlCursor& at)
   map.get("by", plot.by, "Path whose values get a curve each. Without the key there is one curve.");
   plot.x_label = plot.x;
   plot.y_label = plot.y;
-  plot.log = map.get("log", "Whether both axes are logarithmic. Without the key: false.").boolean().value_or(false);
+  map.get("log", plot.log, "Whether both axes are logarithmic. Without the key: false.");
   const YamlCursor labels = map.get("labels", "Labels of both axes. Without the key: the names in x and y.");
   if (labels.present())
   {
