@@ -135,6 +135,42 @@ bool fits(const SceneState& loaded, const SceneState& now, std::size_t k, const 
   return good && pins == cloth.pins.size();
 }
 
+/// The state in the bytes of a whole file. Throws std::runtime_error that says what is wrong with the file.
+SceneState stateOfFile(const std::string& bytes, std::uint64_t fingerprint)
+{
+  std::uint64_t header[5] = {};
+  ByteReader reader(bytes.data(), bytes.size());
+  if (bytes.size() >= sizeof(std::uint64_t))
+    reader(header[0]);
+  if (header[0] != magic)
+    throw std::runtime_error("is not a saved state (of a machine with this byte order)");
+  if (bytes.size() < header_size)
+    throw std::runtime_error("ends too early");
+  for (int k = 1; k < 5; ++k)
+    reader(header[k]);
+  if (header[1] != version)
+  {
+    throw std::runtime_error("has format version " + std::to_string(header[1]) + "; this program reads version " +
+                             std::to_string(version));
+  }
+  if (header[3] != reader.left())
+  {
+    throw std::runtime_error("has " + std::to_string(reader.left()) + " bytes of state; its header says " +
+                             std::to_string(header[3]));
+  }
+  Checksum checksum;
+  checksum.add(bytes.data() + header_size, bytes.size() - header_size);
+  if (header[4] != checksum.value())
+    throw std::runtime_error("is damaged (its checksum does not fit)");
+  if (header[2] != fingerprint)
+  {
+    throw std::runtime_error(
+        "belongs to another scene (rods, moduli, grasps, threads, cloths, gravity, step and integrator must be the "
+        "same)");
+  }
+  return stateOfBytes(bytes.data() + header_size, reader.left());
+}
+
 }   // namespace
 
 std::string misfit(const SceneState& loaded, const SceneState& now, const WorldModel& world)
@@ -193,57 +229,17 @@ void Simulation::load(const std::string& path)
   std::ostringstream text;
   text << file.rdbuf();
   const std::string bytes = text.str();
-  if (file.bad() || bytes.empty())
-    throw std::runtime_error(path + ": is empty or cannot be read");
-
-  std::uint64_t header[5] = {};
-  ByteReader reader(bytes.data(), bytes.size());
-  if (bytes.size() >= sizeof(std::uint64_t))
-    reader(header[0]);
-  if (header[0] != magic)
-    throw std::runtime_error(path + ": is not a saved state (of a machine with this byte order)");
-  if (bytes.size() < header_size)
-    throw std::runtime_error(path + ": ends too early");
-  for (int k = 1; k < 5; ++k)
-    reader(header[k]);
-  if (header[1] != version)
-  {
-    throw std::runtime_error(path + ": has format version " + std::to_string(header[1]) +
-                             "; this program reads version " + std::to_string(version));
-  }
-  if (header[3] != reader.left())
-  {
-    throw std::runtime_error(path + ": has " + std::to_string(reader.left()) + " bytes of state; its header says " +
-                             std::to_string(header[3]));
-  }
-  Checksum checksum;
-  checksum.add(bytes.data() + header_size, bytes.size() - header_size);
-  if (header[4] != checksum.value())
-    throw std::runtime_error(path + ": is damaged (its checksum does not fit)");
-  if (header[2] != stateFingerprint(config_, world_->model()))
-  {
-    throw std::runtime_error(path +
-                             ": belongs to another scene (rods, moduli, grasps, threads, cloths, gravity, step and "
-                             "integrator must be the same)");
-  }
-
   SceneState loaded;
   try
   {
-    loaded = stateOfBytes(bytes.data() + header_size, reader.left());
-  }
-  catch (const std::runtime_error& error)
-  {
-    throw std::runtime_error(path + ": " + error.what());
-  }
-  const std::string problem = misfit(loaded, state_, world_->model());
-  if (!problem.empty())
-    throw std::runtime_error(path + ": " + problem);
-  try
-  {
+    if (file.bad() || bytes.empty())
+      throw std::runtime_error("is empty or cannot be read");
+    loaded = stateOfFile(bytes, stateFingerprint(config_, world_->model()));
+    if (const std::string problem = misfit(loaded, state_, world_->model()); !problem.empty())
+      throw std::runtime_error(problem);
     world_->checkCloths(loaded);
   }
-  catch (const std::invalid_argument& error)
+  catch (const std::exception& error)
   {
     throw std::runtime_error(path + ": " + error.what());
   }
