@@ -105,25 +105,18 @@ private:
       }
     }
     for (const BodyConfig& body : config_.bodies)
-    {
       for (const WeldConfig& weld : body.welds)
         if (place_.kind == Kind::rod && weld.rod == object_)
           holder_.add(toNodes(object_, weld.first_node, weld.last_node), "the weld to " + quoted("body", body.name));
-    }
-    if (place_.kind == Kind::thread)
-    {
-      for (const ThreadState& thread : state.threads[object_].threads)
-      {
-        for (int end = 0; end < 2; ++end)
+    if (place_.kind != Kind::thread)
+      return;
+    for (const ThreadState& thread : state.threads[object_].threads)
+      for (int end = 0; end < 2; ++end)
+        if (thread.ends[end].held)
         {
-          if (thread.ends[end].held)
-          {
-            holder_.add(((end ? thread.x.back() : thread.x.front()) - place_.position).norm(),
-                        config_.threads[object_].nozzle ? "the nozzle" : "a held end");
-          }
+          holder_.add(((end ? thread.x.back() : thread.x.front()) - place_.position).norm(),
+                      config_.threads[object_].nozzle ? "the nozzle" : "a held end");
         }
-      }
-    }
   }
 
   double toNodes(int rod, int first, int last) const

@@ -21,6 +21,13 @@ double largestDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b)
 
 void fail(StaticsRun& run, const std::string& message) { run.end.refuse(StepFailure::newton_diverged, message); }
 
+/// Ends the run with the report of an equilibrium that was not found.
+void fail(StaticsRun& run, const StepReport& report, double factor)
+{
+  run.end = report;
+  run.end.message = atFactor(factor) + report.message;
+}
+
 /// Sum of the sizes of all loads, torques as forces at the end of the rod [N].
 double sumOfLoads(const RodModel& model, const RodInputs& loads)
 {
@@ -196,11 +203,7 @@ void StaticsRunner::runFactors(const std::vector<double>& factors, StaticsRun& r
   {
     const StepReport report = solve(factor);
     if (!report.ok)
-    {
-      run.end = report;
-      run.end.message = atFactor(factor) + report.message;
-      return;
-    }
+      return fail(run, report, factor);
     run.rows.push_back(rowAt(factor, report));
   }
 }
@@ -213,11 +216,7 @@ void StaticsRunner::runPath(const PathConfig& path, StaticsRun& run)
   RodState& state = state_.rods[0];
   const StepReport first = stepper.solveEquilibrium(state, loadsAt(0, path.from), false);
   if (!first.ok)
-  {
-    run.end = first;
-    run.end.message = atFactor(path.from) + first.message;
-    return;
-  }
+    return fail(run, first, path.from);
   run.rows.push_back(rowAt(path.from, first));
   RodPath walk(world_.model().rods[0].model, state, loadsAt(0, path.from), loadsPerFactor(0, range), 1.0);
   for (int k = 0; k < kMostTimes * path.steps; ++k)
