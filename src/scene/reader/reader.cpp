@@ -405,21 +405,18 @@ SceneConfig sceneOfTree(const YamlTree& tree, const std::string& file, const std
   return scene;
 }
 
-void logKeys(const std::string& path, KeyLog& log)
-{
-  readTree(parseYaml(fileText(path), path), path, directoryOf(path), &log);
-}
-
-void logKeysOf(const std::string& text, KeyLog& log)
+void logKeysOf(const std::string& text, KeyLog& log, const std::string& directory)
 {
   try
   {
-    readTree(parseYaml(text, "scene"), "scene", ".", &log);
+    readTree(parseYaml(text, "scene"), "scene", directory, &log);
   }
   catch (const SceneError&)
   {
   }
 }
+
+void logKeys(const std::string& path, KeyLog& log) { logKeysOf(fileText(path), log, directoryOf(path)); }
 
 SceneConfig readScene(const std::string& path, const std::vector<std::string>& overrides)
 {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <filesystem>
 #include <set>
 #include <sstream>
 
@@ -237,17 +236,7 @@ std::vector<SceneKey> sceneKeys(const std::vector<std::string>& files)
 {
   KeyLog log;
   for (const std::string& file : files)
-  {
-    try
-    {
-      logKeys(file, log);
-    }
-    catch (const SceneError&)
-    {
-      if (!std::filesystem::is_regular_file(file))
-        throw;
-    }
-  }
+    logKeys(file, log);
   return log.keys();
 }
 
