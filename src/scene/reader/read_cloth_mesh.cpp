@@ -14,29 +14,18 @@ namespace {
 
 constexpr int max_cells = 2000;   // per side of a grid
 
-/// Returns false when something was reported.
-bool readSides(const YamlCursor& at_sides, ClothGrid& grid)
+void readSides(const YamlMap& map, const YamlCursor& at_sides, ClothGrid& grid)
 {
   const auto sides = at_sides.items(2, 2);
-  bool good = sides.size() == 2;
   for (std::size_t k = 0; k < sides.size(); ++k)
   {
-    const auto side = sides[k].vector3(kCoordinate);
-    good = good && side;
-    assign(grid.sides[k], side);
-    if (side && !(side->norm() > 0))
-    {
+    sides[k].read(grid.sides[k], kCoordinate);
+    if (!(grid.sides[k].norm() > 0))
       sides[k].problem("has no length");
-      good = false;
-    }
   }
   const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
-  if (good && std::abs(grid.sides[0].dot(grid.sides[1])) > 1e-6 * width * height)
-  {
+  if (map.sound() && std::abs(grid.sides[0].dot(grid.sides[1])) > 1e-6 * width * height)
     at_sides.problem("must be at right angles; other shapes come from a mesh file");
-    good = false;
-  }
-  return good;
 }
 
 }   // namespace
@@ -85,7 +74,7 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
   int seed = 1;
   const YamlCursor at_seed = map.get("seed", seed, Range::closed(0, 2'000'000'000),
                                      "Seed of the random positions of `pattern: irregular`. Without the key: 1.");
-  bool good = readSides(at_sides, grid);
+  readSides(map, at_sides, grid);
   const double width = grid.sides[0].norm(), height = grid.sides[1].norm();
   int columns = 0, rows = 0;
   at_cells.takes("a whole number in [1, 2000], or [columns, rows]");
@@ -94,21 +83,12 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
     const auto cells = at_cells.items(2, 2);
     for (std::size_t k = 0; k < cells.size(); ++k)
       assign(k == 0 ? columns : rows, cells[k].integer(1, max_cells, "cells"));
-    good = good && columns > 0 && rows > 0;
   }
   else if (at_cells.present())
   {
     assign(columns, at_cells.integer(1, max_cells, "cells"));
-    good = good && columns > 0;
-    if (good && height / width * columns > max_cells)
-    {
+    if (map.sound() && height / width * columns > max_cells)
       at_cells.problem("makes more than " + std::to_string(max_cells) + " rows; give [columns, rows]");
-      good = false;
-    }
-  }
-  else
-  {
-    good = false;
   }
   GridPattern pattern = GridPattern::equilateral;
   map.get("pattern", pattern,
@@ -120,7 +100,8 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
           "corner along the first side, row after row. Without the key: equilateral.");
   if (at_seed.present() && pattern != GridPattern::irregular)
     at_seed.problem("is for pattern: irregular");
-  if (!good || !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
+  if (!map.sound() ||
+      !context.claim(at_cells, (columns + 1.0) * (rows > 0 ? rows + 1.0 : height / width * columns + 1)))
     return std::nullopt;
   if (!at.attempt([&] { mesh = gridMesh(width, height, columns, rows, pattern, static_cast<unsigned>(seed)); }))
     return std::nullopt;

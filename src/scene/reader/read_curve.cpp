@@ -175,37 +175,19 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
 {
   if (!at.present())
     return std::nullopt;
-  YamlMap kinds(at.sharesKeysOf("rods.N.centerline"));
-  std::optional<Curve> curve;
-  int given = 0;
-  const auto read = [&](const char* kind, const char* meaning, auto reader) {
-    const YamlCursor value = kinds.get(kind, meaning);
-    if (value.present())
-    {
-      ++given;
-      YamlMap map(value);
-      const auto read_curve = reader(map);
-      map.finish();
-      context.claim(value, edgesOf(read_curve));
-      curve = read_curve;
-    }
-  };
-  read("straight", "A straight line.", readStraight);
-  read("polyline", "A polyline through points.", readPolyline);
-  read("arc", "An arc of a circle.", readArc);
-  read("helix", "A helix.", readHelix);
-  read("catenary", "A chain of given length that hangs between two points along gravity.", readCatenary);
-  read("trefoil", "A loose overhand (trefoil) knot with two straight tails.", readTrefoil);
-  read("torus_knot", "A closed knot on a torus.", readTorusKnot);
-  read("vee", "Two straight arms that meet at a tip.", readVee);
-  read("file", "A polyline through the points of a file.", [&](YamlMap& map) { return readFile(map, context); });
-  kinds.finish();
-  if (given != 1 && kinds.sound())
-  {
-    at.problem("names " + std::to_string(given) +
-               " curves; must name one of: straight, polyline, arc, helix, catenary, trefoil, torus_knot, vee, file");
-  }
-  return kinds.sound() ? curve : std::nullopt;
+  KindMap<Curve> kinds(at.sharesKeysOf("rods.N.centerline"));
+  kinds.add("straight", "A straight line.", readStraight);
+  kinds.add("polyline", "A polyline through points.", readPolyline);
+  kinds.add("arc", "An arc of a circle.", readArc);
+  kinds.add("helix", "A helix.", readHelix);
+  kinds.add("catenary", "A chain of given length that hangs between two points along gravity.", readCatenary);
+  kinds.add("trefoil", "A loose overhand (trefoil) knot with two straight tails.", readTrefoil);
+  kinds.add("torus_knot", "A closed knot on a torus.", readTorusKnot);
+  kinds.add("vee", "Two straight arms that meet at a tip.", readVee);
+  kinds.add("file", "A polyline through the points of a file.", [&](YamlMap& map) { return readFile(map, context); });
+  const std::optional<Curve> curve = kinds.read("curves");
+  const auto edges = [](const auto& kind) { return edgesOf(kind); };
+  return curve && context.claim(kinds.value(), std::visit(edges, *curve)) ? curve : std::nullopt;
 }
 
 }   // namespace slender

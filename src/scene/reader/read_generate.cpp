@@ -16,8 +16,6 @@ Eigen::Vector3d readDirection(const YamlCursor& at, const Eigen::Vector3d& other
 Generated readGenerators(const YamlCursor& at, const ReadContext& context, int first_rod)
 {
   Generated all;
-  if (!at.present())
-    return all;
   for (const YamlCursor& item : at.items())
   {
     YamlMap map(item);

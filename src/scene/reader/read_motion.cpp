@@ -10,30 +10,26 @@ namespace {
 std::optional<TableMotion> readTable(const YamlCursor& at, bool needs_orientation)
 {
   TableMotion motion;
-  bool good = true;
+  const std::size_t before = at.problems().size();
   at.takes("rows [t, x, y, z, qx, qy, qz, qw]; or [t, x, y, z] where no orientation is needed");
   for (const YamlCursor& item : at.items(1))
   {
     const auto row = item.numbers(Range::closed(-1e9, 1e9));
     if (!row)
-    {
-      good = false;
       continue;
-    }
     if (row->size() != 8 && (needs_orientation || row->size() != 4))
     {
       item.problem("has " + std::to_string(row->size()) + " numbers; must be [t, x, y, z, qx, qy, qz, qw]" +
                    (needs_orientation ? "" : " or [t, x, y, z]"));
-      good = false;
       continue;
     }
     std::vector<double> numbers = *row;
     if (numbers.size() == 4)
       numbers.insert(numbers.end(), {0, 0, 0, 1});
-    const auto append = [&] { appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1)); };
-    good = item.attempt(append) && good;
+    item.attempt([&] { appendRecorded(motion.poses, numbers[0], checkedPose(numbers.data() + 1)); });
   }
-  return good && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion)) : std::nullopt;
+  return at.problems().size() == before && !motion.poses.empty() ? std::optional<TableMotion>(std::move(motion))
+                                                                 : std::nullopt;
 }
 
 /// Reads the motion of the named body, or of the only body in the file.

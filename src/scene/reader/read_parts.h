@@ -65,6 +65,45 @@ std::vector<Object> readNamed(const YamlCursor& list, std::size_t most, const st
     return object;
   });
 }
+/// A map with one key, which says of which kind a thing is, and whose value has the keys of this kind.
+template <class Thing>
+class KindMap
+{
+public:
+  explicit KindMap(const YamlCursor& at) : kinds_(at) {}
+
+  /// A kind, whose things read(map) makes.
+  template <class Read>
+  void add(const char* kind, const char* meaning, const Read& read)
+  {
+    names_.push_back(kind);
+    const YamlCursor value = kinds_.get(kind, meaning);
+    if (!value.present())
+      return;
+    given_.push_back(value);
+    YamlMap map(value);
+    thing_ = read(map);
+  }
+  /// The thing; nothing when something was reported. `things`: the word for several of them.
+  std::optional<Thing> read(const char* things)
+  {
+    kinds_.finish();
+    if (given_.size() != 1 && kinds_.sound())
+    {
+      kinds_.at().problem("names " + std::to_string(given_.size()) + " " + things +
+                          "; must name one of: " + joinWords(names_));
+    }
+    return kinds_.sound() ? thing_ : std::nullopt;
+  }
+  /// The value of the kind that is given.
+  const YamlCursor& value() const { return given_.front(); }
+
+private:
+  YamlMap kinds_;
+  std::vector<std::string> names_;
+  std::vector<YamlCursor> given_;
+  std::optional<Thing> thing_;
+};
 /// Throws std::runtime_error "`what` has coordinates beyond ... m `where`" if points are farther away than any may be.
 void requireCoordinates(const Eigen::Matrix3Xd& points, const std::string& what = "", const std::string& where = "");
 /// Whole numbers of [0, count), sorted; an entry "3..7" stands for all between, negative ones count from the end.

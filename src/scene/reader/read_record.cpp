@@ -20,17 +20,16 @@ RecordConfig readRecord(const YamlCursor& at)
           "are written whole, and [] writes none. Bags, tables made from bags, OBJ files and states always hold all "
           "nodes. Without the key: all nodes.")
       .takes("a list of indices from 0 (negative: from the end) and ranges FIRST..LAST");
-  if (const YamlCursor fields = map.get("fields",
-                                        "Quantities that are recorded in addition to the motion; docs/quantities.md "
-                                        "defines them. Without the key nothing is computed or recorded in addition.");
-      fields.present())
-    for (const YamlCursor& item : fields.items())
-      if (const auto field = item.choice(recordFieldNames()))
-      {
-        if (std::find(record.fields.begin(), record.fields.end(), *field) != record.fields.end())
-          item.problem("is named twice; leave one out");
-        record.fields.push_back(*field);
-      }
+  const YamlCursor fields = map.get("fields",
+                                    "Quantities that are recorded in addition to the motion; docs/quantities.md "
+                                    "defines them. Without the key nothing is computed or recorded in addition.");
+  for (const YamlCursor& item : fields.items())
+    if (const auto field = item.choice(recordFieldNames()))
+    {
+      if (std::find(record.fields.begin(), record.fields.end(), *field) != record.fields.end())
+        item.problem("is named twice; leave one out");
+      record.fields.push_back(*field);
+    }
   return record;
 }
 

@@ -163,12 +163,7 @@ std::vector<std::pair<ObstacleConfig, YamlCursor>> readRobots(const YamlCursor& 
   std::vector<std::pair<ObstacleConfig, YamlCursor>> obstacles;
   if (!at.present())
     return obstacles;
-  if (!at.isList())
-  {
-    readRobot(at, context, obstacles);
-    return obstacles;
-  }
-  for (const YamlCursor& robot : at.items(1, 1000))
+  for (const YamlCursor& robot : at.isList() ? at.items(1, 1000) : std::vector<YamlCursor>{at})
     readRobot(robot, context, obstacles);
   return obstacles;
 }

@@ -143,36 +143,21 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
     return std::nullopt;
   if (!at.isMap())
     return at.problem("must be a map with one shape and its measures, e.g. {plane: {}} or {sphere: {radius: 0.1}}");
-  YamlMap kinds(at);
-  std::optional<Shape> shape;
-  int given = 0;
-  const auto read = [&](const char* kind, const char* meaning, auto reader) {
-    const YamlCursor value = kinds.get(kind, meaning);
-    if (value.present())
-    {
-      ++given;
-      YamlMap map(value);
-      shape = reader(map);
-    }
-  };
-  read("plane", "A half-space below a plane: z of the pose points out of the solid. `plane: {}` is the floor z = 0.",
-       [&](YamlMap& map) { return readPlane(map, pose); });
-  read("sphere", "A sphere about the origin of the pose.", [](YamlMap& map) {
+  KindMap<Shape> kinds(at);
+  kinds.add("plane",
+            "A half-space below a plane: z of the pose points out of the solid. `plane: {}` is the floor z = 0.",
+            [&](YamlMap& map) { return readPlane(map, pose); });
+  kinds.add("sphere", "A sphere about the origin of the pose.", [](YamlMap& map) {
     Sphere sphere;
     map.get("radius", sphere.radius, kLength, "Radius. Without the key: 0.1 m.");
     return sphere;
   });
-  read("box", "A box, centred at the origin of the pose.", readBox);
-  read("cylinder", "A cylinder about z, centred at the origin of the pose.", readRound<Cylinder>);
-  read("capsule", "A cylinder about z with round ends, centred at the origin of the pose.", readRound<Capsule>);
-  read("mesh", "A closed triangle mesh.", [&](YamlMap& map) { return readMesh(map, context); });
-  kinds.finish();
-  if (given != 1 && kinds.sound())
-  {
-    at.problem("names " + std::to_string(given) +
-               " shapes; must name one of: plane, sphere, box, cylinder, capsule, mesh");
-  }
-  const bool good = kinds.sound() && at.attempt([&] { checkShape(*shape); });
+  kinds.add("box", "A box, centred at the origin of the pose.", readBox);
+  kinds.add("cylinder", "A cylinder about z, centred at the origin of the pose.", readRound<Cylinder>);
+  kinds.add("capsule", "A cylinder about z with round ends, centred at the origin of the pose.", readRound<Capsule>);
+  kinds.add("mesh", "A closed triangle mesh.", [&](YamlMap& map) { return readMesh(map, context); });
+  const std::optional<Shape> shape = kinds.read("shapes");
+  const bool good = shape && at.attempt([&] { checkShape(*shape); });
   return good ? shape : std::nullopt;
 }
 

@@ -213,11 +213,10 @@ void readThreadCurve(const YamlCursor& centerline, const YamlCursor& radius, con
     });
   }
   YamlMap held(ends);
-  const char* names[2] = {"oldest", "newest"};
-  const char* meanings[2] = {"Whether the oldest end is clamped where it is. Without the key: free.",
-                             "Whether the newest end is clamped where it is. Without the key: free."};
-  for (int end = 0; end < 2; ++end)
-    held.get(names[end], thread.held[end], {{"free", false}, {"held", true}}, meanings[end]);
+  held.get("oldest", thread.held[0], {{"free", false}, {"held", true}},
+           "Whether the oldest end is clamped where it is. Without the key: free.");
+  held.get("newest", thread.held[1], {{"free", false}, {"held", true}},
+           "Whether the newest end is clamped where it is. Without the key: free.");
 }
 
 void readRegion(const YamlCursor& region, ThreadConfig& thread)

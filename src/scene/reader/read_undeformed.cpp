@@ -70,22 +70,22 @@ Eigen::Matrix3Xd readOffsets(const YamlMap& map, const YamlCursor& folds, const 
   }
   else
   {
+    const Range any = Range::closed(-1e6, 1e6);
     const YamlCursor along =
-        folds.present() ? shape.require("along", "Direction within the cloth along which folds follow each other.")
-                        : shape.get("axis", "Axis about which ridges follow each other. Without the key: [0, 0, 1].");
-    assign(direction, along.vector3(Range::closed(-1e6, 1e6)));
+        folds.present()
+            ? shape.require("along", direction, any, "Direction within the cloth along which folds follow each other.")
+            : shape.get("axis", direction, any,
+                        "Axis about which ridges follow each other. Without the key: [0, 0, 1].");
     if (!(direction.norm() > 0))
     {
       along.problem("must not be zero");
       return {};
     }
     const YamlCursor scale =
-        folds.present() ? shape.require("wavelength", "Length of a fold and the next; at least four edges of the mesh.")
-                        : shape.require("count", "Number of ridges around the axis.");
-    if (folds.present())
-      assign(wavelength, scale.number(Range::above(0, 1e3, "m")));
-    else
-      assign(count, scale.integer(1, 100'000, "ridges"));
+        folds.present()
+            ? shape.require("wavelength", wavelength, Range::above(0, 1e3, "m"),
+                            "Length of a fold and the next; at least four edges of the mesh.")
+            : shape.require("count", count, Range::closed(1, 100'000, "ridges"), "Number of ridges around the axis.");
     const bool known = along.problems().size() == before && cloth.vertices.cols() > 0;
     if (known && !(folds.present() ? foldsFit(scale, along, direction, wavelength, cloth)
                                    : ridgesFit(scale, direction, count, cloth)))
