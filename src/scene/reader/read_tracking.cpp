@@ -35,49 +35,37 @@ TrackedMesh readTrackedMesh(const YamlCursor& at, const ReadContext& context, co
   TrackedMesh tracked;
   int levels = 0;
   const TriangleMesh& coarse = guide.config.mesh;
+  const std::size_t before = at.problems().size();
   if (!at.present() || at.isScalar())
   {
     tracked.kind = TrackedMesh::same;
-    if (at.present() && !at.choice<bool>({{"same", true}}))
-      return tracked;
+    if (at.present())
+      at.choice<bool>({{"same", true}});
+  }
+  else if (at.isMap() && at.find("file").present())
+  {
+    tracked.kind = TrackedMesh::separate;
+    tracked.file = readMeshFile(at, context);
+    if (tracked.file)
+      tracked.subdivision.mesh = tracked.file->mesh;
   }
   else
   {
     YamlMap map(at);
-    if (map.has("file"))
-    {
-      tracked.kind = TrackedMesh::separate;
-      tracked.file = readMeshFile(at, context);
-      tracked.good = tracked.file.has_value();
-      if (tracked.good)
-        tracked.subdivision.mesh = tracked.file->mesh;
-    }
-    else
-    {
-      const auto given =
-          map.require("subdivide", "How often each face of the guide is divided into four.").integer(1, 10, "levels");
-      if (!given)
-        return tracked;
-      levels = *given;
-      if (std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols()) > 2 * max_fine_vertices)
-      {
-        map.find("subdivide")
-            .problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
-        return tracked;
-      }
-      if (!context.claim(map.find("subdivide"),
-                         0.5 * std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols())))
-        return tracked;
-    }
+    const YamlCursor subdivided = map.require("subdivide", levels, Range::closed(1, 10, "levels"),
+                                              "How often each face of the guide is divided into four.");
+    const double faces = std::pow(4.0, levels) * static_cast<double>(coarse.triangles.cols());
+    if (faces > 2 * max_fine_vertices)
+      subdivided.problem("makes more than " + std::to_string(static_cast<int>(max_fine_vertices)) + " vertices");
+    else if (levels > 0)
+      context.claim(subdivided, 0.5 * faces);
   }
-  if (tracked.kind != TrackedMesh::separate)
-  {
-    if (coarse.vertices.cols() == 0)
-      return tracked;   // reported
+  const bool own = tracked.kind == TrackedMesh::separate;
+  if (at.problems().size() != before || (!own && coarse.vertices.cols() == 0))
+    return tracked;   // reported
+  if (!own)
     tracked.subdivision = subdivide(coarse, levels);
-    tracked.good = true;
-  }
-  tracked.good = tracked.good && at.attempt([&] {
+  tracked.good = at.attempt([&] {
     requireSoundMesh(tracked.subdivision.mesh, tracked.file ? tracked.file->path
                                                : guide.file ? guide.file->path
                                                             : "undeformed");

@@ -264,14 +264,10 @@ std::optional<std::vector<double>> YamlCursor::numbers(const Range& range) const
 std::optional<std::vector<double>> YamlCursor::numbersIn(const Range& range) const
 {
   std::vector<double> values;
-  bool good = true;
   for (const YamlCursor& item : items())
-  {
-    const auto value = item.numberIn(range, "a number " + range.text());
-    good = good && value;
-    values.push_back(value.value_or(0.0));
-  }
-  return good ? std::optional<std::vector<double>>(std::move(values)) : std::nullopt;
+    if (const auto value = item.numberIn(range, "a number " + range.text()))
+      values.push_back(*value);
+  return values.size() == tree_->items.size() ? std::optional<std::vector<double>>(std::move(values)) : std::nullopt;
 }
 
 int YamlCursor::chosen(const std::vector<std::string>& words) const
