@@ -203,17 +203,13 @@ void SheetCandidates::updateNeighbours(const ContactSurface& surface, const Shee
 void SheetCandidates::addNeighbours(const ContactSurface& surface, const SheetPieces& pieces, int a, int b)
 {
   const SheetPieces::Element &e = pieces.elements[a], &f = pieces.elements[b];
-  for (const int i : e.edge)
-    for (const int j : f.edge)
-      if (i >= 0 && j >= 0)
-        addEdges(pieces, std::min(i, j), std::max(i, j));
-  for (int k = 0; k < 3; ++k)
-  {
-    if (e.point[k] >= 0 && f.corners == 3)
-      addPoint(surface, pieces, e.point[k], b);
-    if (f.point[k] >= 0 && e.corners == 3)
-      addPoint(surface, pieces, f.point[k], a);
-  }
+  for (int k = 0; k < 3 && e.edge[k] >= 0; ++k)
+    for (int l = 0; l < 3 && f.edge[l] >= 0; ++l)
+      addEdges(pieces, std::min(e.edge[k], f.edge[l]), std::max(e.edge[k], f.edge[l]));
+  for (int k = 0; k < 3 && e.point[k] >= 0 && f.corners == 3; ++k)
+    addPoint(surface, pieces, e.point[k], b);
+  for (int k = 0; k < 3 && f.point[k] >= 0 && e.corners == 3; ++k)
+    addPoint(surface, pieces, f.point[k], a);
 }
 
 void SheetCandidates::addEdges(const SheetPieces& pieces, int a, int b)

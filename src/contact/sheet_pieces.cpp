@@ -9,6 +9,8 @@ namespace {
 
 bool isDriven(const ContactTriangle& triangle, int corner) { return (triangle.driven >> corner & 1) != 0; }
 
+void append(int number, std::array<int, 3>& owned) { *std::find(owned.begin(), owned.end(), -1) = number; }
+
 }   // namespace
 
 void SheetPieces::build(const ContactSurface& surface)
@@ -28,8 +30,8 @@ void SheetPieces::build(const ContactSurface& surface)
     const ContactSegment& s = surface.segments[i];
     edges.push_back({s.a, s.b, s.object, s.radius, s.prescribed()});
     Element e{2, {s.a, s.b, s.b}, {-1, -1, -1}, {i, -1, -1}, s.object};
-    addPoint(s.a, s.object, s.radius, (s.driven & 1) != 0, e.point[0]);
-    addPoint(s.b, s.object, s.radius, (s.driven & 2) != 0, e.point[1]);
+    addPoint(s.a, s.radius, (s.driven & 1) != 0, e);
+    addPoint(s.b, s.radius, (s.driven & 2) != 0, e);
     elements.push_back(e);
   }
   const std::size_t first = points.size();
@@ -37,7 +39,7 @@ void SheetPieces::build(const ContactSurface& surface)
   {
     Element e{3, t.corner, {-1, -1, -1}, {-1, -1, -1}, t.object};
     for (int k = 0; k < 3; ++k)
-      addPoint(t.corner[k], t.object, t.half_thickness, isDriven(t, k), e.point[k]);
+      addPoint(t.corner[k], t.half_thickness, isDriven(t, k), e);
     elements.push_back(e);
   }
   findEdges(surface);
@@ -47,8 +49,8 @@ void SheetPieces::build(const ContactSurface& surface)
   findFaces(surface);
 }
 
-/// `number` becomes that of the point if nobody has owned it so far.
-void SheetPieces::addPoint(int point, int object, double radius, bool driven, int& number)
+/// `owner` owns the point if nobody has owned it so far.
+void SheetPieces::addPoint(int point, double radius, bool driven, Element& owner)
 {
   int& known = number_of_point_[static_cast<std::size_t>(point)];
   if (known >= 0)
@@ -58,8 +60,9 @@ void SheetPieces::addPoint(int point, int object, double radius, bool driven, in
     p.driven = p.driven || driven;
     return;
   }
-  known = number = static_cast<int>(points.size());
-  points.push_back({point, object, radius, driven});
+  known = static_cast<int>(points.size());
+  append(known, owner.point);
+  points.push_back({point, owner.object, radius, driven});
 }
 
 void SheetPieces::findEdges(const ContactSurface& surface)
@@ -83,7 +86,7 @@ void SheetPieces::findEdges(const ContactSurface& surface)
       edges.back().radius = std::max(edges.back().radius, t.half_thickness);
       continue;
     }
-    elements[segments + side.triangle].edge[side.side] = static_cast<int>(edges.size());
+    append(static_cast<int>(edges.size()), elements[segments + side.triangle].edge);
     edges.push_back(
         {side.low, side.high, t.object, t.half_thickness, isDriven(t, side.side) && isDriven(t, (side.side + 1) % 3)});
   }
@@ -104,7 +107,8 @@ void SheetPieces::findFaces(const ContactSurface& surface)
   for (const Face& corner : corners)
     if (!covered_[corner.corner[0]])
       faces.push_back(corner);
-  for (std::size_t i = 0; i < sides_.size();)
+  int number = segments;   // of the edge; those of triangles are in the order of sides
+  for (std::size_t i = 0; i < sides_.size(); ++number)
   {
     const Side& side = sides_[i];
     bool in_face = false;
@@ -112,7 +116,6 @@ void SheetPieces::findFaces(const ContactSurface& surface)
     for (; j < sides_.size() && sides_[j].low == side.low && sides_[j].high == side.high; ++j)
       in_face = in_face || surface.triangles[sides_[j].triangle].driven == 0;
     const ContactTriangle& t = surface.triangles[side.triangle];
-    const int number = elements[segments + side.triangle].edge[side.side];
     if (!in_face && !isDriven(t, side.side) && !isDriven(t, (side.side + 1) % 3))
       faces.push_back({2, number, {side.low, side.high, -1}, edges[number].radius, t.object});
     i = j;

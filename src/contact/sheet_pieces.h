@@ -28,7 +28,7 @@ struct SheetPieces
   {
     int corners;                      ///< 2 or 3
     std::array<int, 3> corner;        ///< points; of a segment the third is the second one
-    std::array<int, 3> point, edge;   ///< numbers of points and edges that it owns; -1: another element does
+    std::array<int, 3> point, edge;   ///< numbers of points and edges that it owns; then -1
     int object;
   };
   /// A triangle, or a free edge or corner, as it touches solids.
@@ -60,7 +60,7 @@ private:
   {
     int low, high, triangle, side;
   };
-  void addPoint(int point, int object, double radius, bool driven, int& number);
+  void addPoint(int point, double radius, bool driven, Element& owner);
   void findEdges(const ContactSurface& surface);
   void findFaces(const ContactSurface& surface);
 
