@@ -101,15 +101,15 @@ TEST(MixedCheck, FindsANeedleThatPassesThroughARing)
 {
   Simulation scene(parseScene(R"(
 time: {step: 0.005, integrator: implicit_euler}
-gravity: [0, 0, -2400]
+gravity: [0, 0, -960]
 rods:
   - name: ring
     closed: true
-    centerline: {polyline: {points: [[-0.05, 0, 0], [0, 0.05, 0], [0.05, 0, 0], [0, -0.05, 0]]}}
+    centerline: {polyline: {points: [[-0.05, 0, 0], [0, 0.05, 0], [0.05, 0, 0], [0.03, -0.05, 0], [-0.03, -0.05, 0]]}}
     cross_section: {radius: 0.002}
     grasps: {held: {edges: [0..3]}}
   - name: needle
-    centerline: {straight: {from: [-0.2, -0.025, 0.03], to: [0.2, -0.025, 0.03], edges: 8}}
+    centerline: {straight: {from: [-0.2, -0.025, 0.012], to: [0.2, -0.025, 0.012], edges: 8}}
     cross_section: {radius: 0.002}
 )"));
   MixedCheck check(scene);
