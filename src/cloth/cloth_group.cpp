@@ -58,14 +58,16 @@ ClothGroup::ClothGroup(ClothGroupModel model, const ClothOptions& options) : mod
   if (!model_.options.empty() && model_.options.size() != model_.cloths.size())
     throw std::invalid_argument("cloths: " + std::to_string(model_.cloths.size()) +
                                 " options expected, one per cloth, or none");
+  if (model_.options.empty())
+    model_.options.assign(model_.cloths.size(), options);
   budget_ = std::make_shared<WorkBudget>();
   first_.push_back(0);
   for (std::size_t k = 0; k < model_.cloths.size(); ++k)
   {
     const ClothModel& cloth = *model_.cloths[k];
     const ContactProperties& contact = model_.contact[k];
-    steppers_.emplace_back(model_.cloths[k], model_.options.empty() ? options : model_.options[k]);
-    if ((model_.options.empty() ? options : model_.options[k]).error_tolerance == 0)
+    steppers_.emplace_back(model_.cloths[k], model_.options[k]);
+    if (model_.options[k].error_tolerance == 0)
       steppers_.back().useBudget(budget_);
     surface_.rest.conservativeResize(3, first_.back() + cloth.vertices());
     surface_.rest.rightCols(cloth.vertices()) = cloth.rest.vertices;
@@ -281,7 +283,7 @@ bool ClothGroup::stepCloths(const ClothGroupInputs& inputs, double to, double h,
     report.merge(own);
     if (!report.ok)
       return false;
-    const ClothOptions& options = model_.options.empty() ? options_ : model_.options[k];
+    const ClothOptions& options = model_.options[k];
     order_[k] = all && (order(options.integrator) == 2 || options.error_tolerance > 0) ? Order::own : Order::first;
   }
   return true;

@@ -51,17 +51,6 @@ StepReport ClothStepper::Impl::advance()
   return report;
 }
 
-StepReport ClothStepper::Impl::step(ClothState& state, const ClothInputs& inputs, double duration)
-{
-  StepReport report;
-  if (!load(state, inputs, duration, report))
-    return report;
-  report = advance();
-  if (report.ok)
-    end(state);
-  return report;
-}
-
 ClothStepper::ClothStepper(std::shared_ptr<const ClothModel> model, const ClothOptions& options)
   : impl_(std::make_unique<Impl>(std::move(model), options))
 {
@@ -73,7 +62,13 @@ void ClothStepper::useBudget(std::shared_ptr<WorkBudget> budget) { impl_->useBud
 
 StepReport ClothStepper::step(ClothState& state, const ClothInputs& inputs, double duration)
 {
-  return impl_->step(state, inputs, duration);
+  StepReport report;
+  if (!impl_->load(state, inputs, duration, report))
+    return report;
+  report = impl_->advance();
+  if (report.ok)
+    impl_->end(state);
+  return report;
 }
 StepReport ClothStepper::stepUndivided(ClothState& state, const ClothInputs& inputs, double duration)
 {
@@ -83,7 +78,7 @@ StepReport ClothStepper::stepUndivided(ClothState& state, const ClothInputs& inp
   if (own.integrator == Integrator::tr_bdf2)
     impl_->options.integrator = Integrator::implicit_euler;
   impl_->undivided = own.error_tolerance > 0.0 || own.integrator == Integrator::tr_bdf2;
-  const StepReport report = impl_->step(state, inputs, duration);
+  const StepReport report = step(state, inputs, duration);
   impl_->undivided = false;
   if (report.ok)
     state.next_step = next_step;

@@ -35,7 +35,6 @@ public:
   /// A step is load(), advance(), end(). load() returns false if it cannot begin; the report then says why.
   bool load(const ClothState& state, const ClothInputs& inputs, double duration, StepReport& report);
   StepReport advance();
-  StepReport step(ClothState& state, const ClothInputs& inputs, double duration);
   StepReport statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles);
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement,
                Eigen::Matrix3Xd& pin_forces_change, Eigen::Matrix3Xd& average_forces_change);

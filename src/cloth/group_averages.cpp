@@ -137,7 +137,7 @@ double ClothGroup::boundAverages(std::size_t k, double h, double gap)
   constexpr int kSweeps = 2000;
   AverageCorrection& to = corrections_[k];
   // of a force's direction, by the cloth's own step
-  const double unresolved = 2.0 * (model_.options.empty() ? options_ : model_.options[k]).linear_tolerance;
+  const double unresolved = 2.0 * model_.options[k].linear_tolerance;
   const Eigen::VectorXd& bounds = averagesOf(k)->bounds;
   std::vector<int>& at_bound = next_.cloths[k].at_bound;
   at_bound.clear();

@@ -27,18 +27,13 @@ ClothObject::ClothObject(const WorldModel& world, int number)
 bool ClothObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
   const ClothState& from = state.cloths[index];
-  const ClothInputs* own = &inputs.cloths[index];
-  if (tracks())
-  {
-    trackedInputs(world_, index, state, inputs, tracked_inputs_);
-    own = &tracked_inputs_;
-  }
+  takeClothInputs(world_, index, state, inputs, inputs_);
   const double duration = world_.time.step;
   if (stepper_)
-    return stepper_->impl().load(from, *own, duration, report);
-  if (!part_->accepts(from, *own, duration, report))
+    return stepper_->impl().load(from, inputs_, duration, report);
+  if (!part_->accepts(from, inputs_, duration, report))
     return false;
-  part_->begin(from, *own, duration);
+  part_->begin(from, inputs_, duration);
   return true;
 }
 
@@ -53,16 +48,9 @@ std::optional<StepReport> ClothObject::stepAlone()
   return stepper_ ? std::make_optional(stepper_->impl().advance()) : std::nullopt;
 }
 
-IslandFinder::Reach ClothObject::reach() const
-{
-  const auto& contact = model_.contact;
-  return {contact.has_value(), contact && contact->others, contact && contact->solids, false, BoundingBox::empty()};
-}
-
 void ClothObject::finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const
 {
-  if (tracks())
-    takeClothGuide(world_, index, tracked_inputs_.averages, part_->work().average_forces, inputs, state, report);
+  takeClothGuide(world_, index, inputs_.averages, part_->work().average_forces, inputs, state, report);
 }
 
 void ClothObject::addTo(Meeting& meeting, const WorldState& state)
@@ -76,7 +64,7 @@ void ClothObject::addTo(Meeting& meeting, const WorldState& state)
 
 StepReport ClothObject::solveEquilibrium(WorldState& state, const WorldInputs& inputs)
 {
-  if (tracks())
+  if (model_.tracked.sets)
     throw std::invalid_argument("a cloth that tracks a guide has no statics");
   if (!stepper_)
     throw std::invalid_argument("cloth with contact has no statics");

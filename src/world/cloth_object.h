@@ -21,7 +21,7 @@ public:
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addParts(std::vector<Part*>& parts) override;
   std::optional<StepReport> stepAlone() override;
-  IslandFinder::Reach reach() const override;
+  IslandFinder::Reach reach() const override { return reachOf(model_.contact); }
   void finish(WorldState& state) override { part_->end(state.cloths[index]); }
   void finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const override;
   ContactMemory& contact(WorldState& state) const override { return state.contact.cloths[index]; }
@@ -33,14 +33,12 @@ public:
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs);
 
 private:
-  bool tracks() const { return model_.tracked.sets != nullptr; }
-
   const WorldModel& world_;
   const WorldModel::Cloth& model_;
   std::unique_ptr<ClothStepper> stepper_;   ///< of a cloth that touches nothing
   std::unique_ptr<ClothPart> own_part_;     ///< of one that does
   ClothPart* part_ = nullptr;               ///< either that one or that of the stepper
-  ClothInputs tracked_inputs_;              ///< those of the world, with the averages
+  ClothInputs inputs_;                      ///< of the present step, with the averages
 };
 
 }   // namespace slender

@@ -8,69 +8,40 @@
 
 namespace slender {
 
-namespace {
-
-/// Returns the content, which is valid.
-WorldContent checked(const WorldModel& world, WorldContent content)
-{
-  const auto need = [](bool good, const auto& what) {   // a text is made only where it is needed
-    if (!good)
-      throw std::invalid_argument(what);
-  };
-  for (const int b : content.bodies)
-    if (world.bodies[b].body.simulated)
-      checkBody(world.bodies[b].body);
-  bool touching_threads = false;
-  for (const int k : content.threads)
-  {
-    const ThreadModel& model = *world.threads[k].model;
-    if (!world.threads[k].contact)
-    {
-      checkLoneThread(model);
-      continue;
-    }
-    touching_threads = true;
-    const double friction = world.threads[k].contact->friction, merging = world.threads[k].merging;
-    checkThreadModel(model);
-    const auto check_value = [&](bool good, const char* what, double value, const char* range) {
-      need(good, "thread '" + model.name + "': " + what + " is " + std::to_string(value) + ", allowed: " + range);
-    };
-    check_value(friction >= 0.0 && std::isfinite(friction), "friction", friction, "zero or more");
-    check_value(merging >= 0.0 && merging < 1.0, "merging", merging, "zero to 1 (exclusive)");
-  }
-  const bool simulates =
-      std::any_of(content.rods.begin(), content.rods.end(), [&](int r) { return meetsOthers(world, r); }) ||
-      std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return world.bodies[b].body.simulated; });
-  const auto touches = [](const auto& objects) { return [&](int k) { return objects[k].contact.has_value(); }; };
-  const bool touching =
-      std::any_of(content.cloths.begin(), content.cloths.end(), touches(world.cloths)) ||
-      std::any_of(content.rods.begin(), content.rods.end(), touches(world.rods)) ||
-      std::any_of(content.bodies.begin(), content.bodies.end(), [&](int b) { return meetsSolids(world, b); });
-  const bool may_join = touching || std::any_of(content.bodies.begin(), content.bodies.end(),
-                                                [&](int b) { return world.bodies[b].shape; });
-  need(world.time.integrator != Integrator::symplectic_euler || !simulates ||
-           !(touching || (touching_threads && may_join)),
-       "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 "
-       "or tr_bdf2 (time.integrator)");
-  need(!touching_threads || !simulates || !may_join || world.time.integrator == Integrator::implicit_euler,
-       "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
-       "implicit_euler");
-  return content;
-}
-
-}   // namespace
-
-IslandScheduler::IslandScheduler(const WorldModel& world, WorldContent content, WorldState& state)
+IslandScheduler::IslandScheduler(const WorldModel& world, bool leaders, WorldState& state)
   : world_(world),
-    objects_(world, checked(world, std::move(content)), state)
+    objects_(world, leaders, state)
 {
+  checkIntegrator();
   for (const RodObject& rod : objects_.rods)
     nodes_ += rod.stepper->model->nodes();
-  for (const int c : objects_.content.cloths)
-    nodes_ += world.cloths[c].model->vertices();
+  for (const ClothObject& cloth : objects_.cloths)
+    nodes_ += cloth.part().points();
+  if (objects_.impulses)
+    nodes_ += objects_.impulses->vertices();
   for (const WorldObject* object : objects_.all)
     reach_.push_back(object->reach());
   checkClearance(state);
+}
+
+/// Throws std::invalid_argument if the integrator of the world is not one for what its objects may meet.
+void IslandScheduler::checkIntegrator() const
+{
+  const auto any = [](const auto& objects, const auto& is) { return std::any_of(objects.begin(), objects.end(), is); };
+  const auto touches = [](const WorldObject& object) { return object.hasSurface(); };
+  const bool simulates = !objects_.bodies.empty() || any(objects_.rods, [](const RodObject& rod) { return rod.meets; });
+  const bool touching = any(objects_.cloths, touches) || any(objects_.rods, touches) || any(objects_.bodies, touches);
+  const bool touching_threads = any(objects_.threads, touches);
+  const bool may_join = touching || any(world_.bodies, [](const auto& body) { return body.shape.has_value(); });
+  if (world_.time.integrator == Integrator::symplectic_euler && simulates &&
+      (touching || (touching_threads && may_join)))
+    throw std::invalid_argument(
+        "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 "
+        "or tr_bdf2 (time.integrator)");
+  if (touching_threads && simulates && may_join && world_.time.integrator != Integrator::implicit_euler)
+    throw std::invalid_argument(
+        "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
+        "implicit_euler");
 }
 
 // ---- what the last step leaves
@@ -81,11 +52,17 @@ void IslandScheduler::addContacts(ContactLoads& out) const
     island->addContacts(out);
 }
 
+void IslandScheduler::forgetContacts()
+{
+  islands_.clear();
+  if (objects_.impulses)
+    objects_.impulses->forgetContacts();
+}
+
 /// On the surface points of an object that is one part [N].
-Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const Part& part) const
+void IslandScheduler::addContactForces(const WorldObject& object, const Part& part, Eigen::Matrix3Xd& forces) const
 {
   const int points = part.points();
-  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, points);
   for (const ObjectIsland* island : islands_)
   {
     if (points == 0 || !island->contact() ||
@@ -96,7 +73,38 @@ Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const
         if (const int point = term.point[k] - part.first_point; term.point[k] >= 0 && point >= 0 && point < points)
           forces.col(point) += term.weight[k] * term.force;
   }
+}
+
+Eigen::Matrix3Xd IslandScheduler::rodContactForces(int number) const
+{
+  const RodObject& rod = objects_.rods.at(number);
+  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, rod.stepper->model->nodes());
+  addContactForces(rod, *rod.part, forces);
   return forces;
+}
+
+Eigen::Matrix3Xd IslandScheduler::clothContactForces(int number) const
+{
+  const ClothObject* cloth = findObject(objects_.cloths, number);
+  if (!cloth)
+    return objects_.impulses->group().contactForces(objects_.impulses->placeOf(number));
+  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, cloth->part().points());
+  addContactForces(*cloth, cloth->part(), forces);
+  return forces;
+}
+
+ClothEnergies IslandScheduler::clothEnergies(int number, const ClothState& state, const Eigen::Vector3d& gravity) const
+{
+  if (const ClothObject* cloth = findObject(objects_.cloths, number))
+    return cloth->part().work().energies(state, gravity);
+  return objects_.impulses->group().stepper(objects_.impulses->placeOf(number)).energies(state, gravity);
+}
+
+const Eigen::Matrix3Xd& IslandScheduler::pinForces(int number) const
+{
+  if (const ClothObject* cloth = findObject(objects_.cloths, number))
+    return cloth->part().work().pin_forces;
+  return objects_.impulses->group().pinForces(objects_.impulses->placeOf(number));
 }
 
 // ---- statics
@@ -106,6 +114,8 @@ StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInput
   for (const RodObject& rod : objects_.rods)
     if (rod.constraints)
       throw std::invalid_argument("a rod that tracks a guide has no statics");
+  if (objects_.impulses)
+    throw std::invalid_argument("cloth with contact has no statics");
   StepReport total;
   for (ClothObject& cloth : objects_.cloths)
     if (total.ok)

@@ -3,7 +3,6 @@
 #include <map>
 #include <vector>
 
-#include "step_group.h"
 #include "island_finder.h"
 #include "object_island.h"
 #include "world_objects.h"
@@ -11,49 +10,45 @@
 
 namespace slender {
 
-/// Rods, threads, cloths and bodies that contact or welds can join, and the obstacles that they meet.
+/// Steps the cloths that lead others, or all other objects of a world, with the obstacles that they meet. Private to
+/// the world.
 ///
 /// In each step the parts are divided into islands. The division begins with parts that are joined, or that would come
 /// near each other if they kept their velocities. When all islands have made their step, parts of different islands
 /// whose ways came near each other are joined, and these islands make their step again.
-class IslandScheduler final : public StepGroup
+class IslandScheduler
 {
 public:
   /// Appends the grasps of the welds to the rods of the state. Throws std::invalid_argument for models that are not
   /// valid, and for states in which surfaces touch or cross.
-  IslandScheduler(const WorldModel& world, WorldContent content, WorldState& state);
+  IslandScheduler(const WorldModel& world, bool leaders, WorldState& state);
 
-  StepReport step(WorldState& state, const WorldInputs& inputs) override;
+  /// Advances its objects by one step. On failure their state is untouched and the report says why.
+  StepReport step(WorldState& state, const WorldInputs& inputs);
   /// Of rods, bodies, and cloths that touch nothing. Threads have no equilibrium: they stay where they are, and the
   /// others do not feel them. Throws std::invalid_argument if there are other cloths, or objects that track a guide.
-  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs) override;
-  void finish(WorldState& state, const WorldInputs& inputs, StepReport& report) override;
-  void addContacts(ContactLoads& out) const override;
-  void forgetContacts() override { islands_.clear(); }
-  void setThreads(int threads) override { loop_.threads = threads; }
-  ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const override
-  {
-    return objects_.cloths[cloth].part().work().energies(state, gravity);
-  }
-  const Eigen::Matrix3Xd& pinForces(int cloth) const override
-  {
-    return objects_.cloths[cloth].part().work().pin_forces;
-  }
-  Eigen::Matrix3Xd clothContactForces(int cloth) const override
-  {
-    return contactForces(objects_.cloths[cloth], objects_.cloths[cloth].part());
-  }
+  StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs);
+  /// Is called when all objects of the world have made their step, and the time is that of its end. Writes into the
+  /// state what follows from the step, and completes the report.
+  void finish(WorldState& state, const WorldInputs& inputs, StepReport& report);
+  /// Adds the contacts of the last step, and what they exert on obstacles and bodies.
+  void addContacts(ContactLoads& out) const;
+  /// The state is another one: there was no last step.
+  void forgetContacts();
+  void setThreads(int threads) { loop_.threads = threads; }
+  /// Throws std::invalid_argument where cloths that collide by impulses cross something.
+  void checkCloths(const WorldState& state);
 
-  /// A rod, named by its place in the content.
-  RodObject& rod(int place) { return objects_.rods[place]; }
-  /// On its nodes [N]; without columns for a rod that touches nothing.
-  Eigen::Matrix3Xd rodContactForces(int place) const
-  {
-    return contactForces(objects_.rods[place], *objects_.rods[place].part);
-  }
+  // ---- of its objects, by their numbers in the world
+  RodObject& rod(int number) { return objects_.rods.at(number); }
+  Eigen::Matrix3Xd rodContactForces(int number) const;   ///< on its nodes [N]
+  ClothEnergies clothEnergies(int number, const ClothState& state, const Eigen::Vector3d& gravity) const;
+  const Eigen::Matrix3Xd& pinForces(int number) const;
+  Eigen::Matrix3Xd clothContactForces(int number) const;   ///< on its vertices [N]
 
 private:
-  Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part) const;
+  void checkIntegrator() const;
+  void addContactForces(const WorldObject& object, const Part& part, Eigen::Matrix3Xd& forces) const;
   void checkClearance(WorldState& state);
   void fitRanges(const Meeting& meeting, WorldState& state);
 

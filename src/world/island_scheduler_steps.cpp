@@ -167,6 +167,12 @@ void IslandScheduler::finish(WorldState& state, const WorldInputs& inputs, StepR
     object->finishGuide(inputs, state, report);
 }
 
+void IslandScheduler::checkCloths(const WorldState& state)
+{
+  if (objects_.impulses)
+    objects_.impulses->check(state);
+}
+
 void IslandScheduler::checkClearance(WorldState& state)
 {
   Meeting meeting;

@@ -79,12 +79,6 @@ void RodObject::finishGuide(const WorldInputs& with, WorldState& state, StepRepo
       std::max(report.tracking_error, constraints->error(targets_, state.rods[index].x) / guide_size_);
 }
 
-IslandFinder::Reach RodObject::reach() const
-{
-  const bool touches = contact_.has_value();
-  return {touches, touches && contact_->others, touches && contact_->solids, false, BoundingBox::empty()};
-}
-
 void RodObject::addTo(Meeting& meeting, const WorldState& state)
 {
   if (!contact_)

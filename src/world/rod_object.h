@@ -17,7 +17,7 @@ public:
   std::string name() const override { return "rod '" + stepper->model->name + "'"; }
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addParts(std::vector<Part*>& parts) override { parts.push_back(part.get()); }
-  IslandFinder::Reach reach() const override;
+  IslandFinder::Reach reach() const override { return reachOf(contact_); }
   void finish(WorldState& state) override { state.rods[index] = stepper->work; }
   ContactMemory& contact(WorldState& state) const override { return state.contact.rods[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;

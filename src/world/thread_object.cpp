@@ -1,6 +1,8 @@
 #include "thread_object.h"
 
 #include <algorithm>
+#include <cmath>
+#include <stdexcept>
 
 #include "meeting.h"
 
@@ -32,6 +34,26 @@ std::uint64_t nextId(const std::vector<ThreadState>& threads)
 }
 
 }   // namespace
+
+ThreadObject::ThreadObject(const WorldModel& world, int number)
+  : WorldObject(number),
+    model(world.threads[number]),
+    time_(world.time)
+{
+  if (!model.contact)
+  {
+    checkLoneThread(*model.model);
+    return;
+  }
+  checkThreadModel(*model.model);
+  const auto check = [this](bool good, const char* what, double value, const char* range) {
+    if (!good)
+      throw std::invalid_argument(name() + ": " + what + " is " + std::to_string(value) + ", allowed: " + range);
+  };
+  const double friction = model.contact->friction;
+  check(friction >= 0.0 && std::isfinite(friction), "friction", friction, "zero or more");
+  check(model.merging >= 0.0 && model.merging < 1.0, "merging", model.merging, "zero to 1 (exclusive)");
+}
 
 bool ThreadObject::load(const WorldState& state, const WorldInputs& inputs, StepReport& report)
 {
@@ -69,12 +91,6 @@ void ThreadObject::addParts(std::vector<Part*>& parts)
 {
   for (std::size_t s = 0; s < strands(); ++s)
     parts.push_back(strands_[s].part.get());
-}
-
-IslandFinder::Reach ThreadObject::reach() const
-{
-  const auto& contact = model.contact;
-  return {contact.has_value(), contact && contact->others, contact && contact->solids, false, BoundingBox::empty()};
 }
 
 void ThreadObject::finish(WorldState& state)

@@ -13,16 +13,12 @@ namespace slender {
 class ThreadObject final : public WorldObject
 {
 public:
-  ThreadObject(const WorldModel& world, int number)
-    : WorldObject(number),
-      model(world.threads[number]),
-      time_(world.time)
-  {
-  }
+  /// Throws std::invalid_argument for a model that is not valid.
+  ThreadObject(const WorldModel& world, int number);
   std::string name() const override { return "thread '" + model.model->name + "'"; }
   bool load(const WorldState& state, const WorldInputs& inputs, StepReport& report) override;
   void addParts(std::vector<Part*>& parts) override;
-  IslandFinder::Reach reach() const override;
+  IslandFinder::Reach reach() const override { return reachOf(model.contact); }
   void finish(WorldState& state) override;
   ContactMemory& contact(WorldState& state) const override { return state.contact.threads[index]; }
   void addTo(Meeting& meeting, const WorldState& state) override;

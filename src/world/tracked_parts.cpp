@@ -26,14 +26,16 @@ const FunctionSet& functionsOf(const TrackedGuide& tracked, const ClothState& cl
   return tracked.sets->at(static_cast<std::size_t>(cloth.average_set));
 }
 
-void trackedInputs(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
-                   ClothInputs& to)
+void takeClothInputs(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
+                     ClothInputs& to)
 {
   const ClothInputs& from = inputs.cloths[cloth];
   to.pins = from.pins;
   to.gravity = from.gravity;
   to.wind = from.wind;
   to.forces = from.forces;
+  if (!model.cloths[cloth].tracked.sets)
+    return;
   functionsOf(model.cloths[cloth].tracked, state.cloths[cloth])
       .constraints->averages(guideOf(model, cloth, state, inputs), to.averages);
   state.cloth_guides[cloth].blend.apply(static_cast<double>(state.steps + 1) * model.time.step, to.averages);
@@ -57,6 +59,8 @@ void takeClothGuide(const WorldModel& model, int cloth, const Eigen::Matrix3Xd& 
                     const WorldInputs& inputs, WorldState& state, StepReport& report)
 {
   const TrackedGuide& tracked = model.cloths[cloth].tracked;
+  if (!tracked.sets)
+    return;
   GuideState& held = state.cloth_guides[cloth];
   const Eigen::Matrix3Xd& guide = guideOf(model, cloth, state, inputs);
   if (tracked.sets->size() > 1)

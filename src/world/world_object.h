@@ -67,6 +67,11 @@ public:
   bool hasSurface() const { return reach().has_points; }
 };
 
+/// What an object with these properties of contact may touch, without a box. Nothing: it touches nothing.
+IslandFinder::Reach reachOf(const std::optional<ContactProperties>& contact);
+
+inline Pose normalized(const Pose& pose) { return {pose.position, pose.orientation.normalized()}; }
+
 /// Completes the report of a step whose inputs are not valid. Returns false.
 bool refuseInput(const std::string& what, StepReport& report);
 

@@ -15,17 +15,12 @@ bool isSound(const GraspTarget& t)
          (!t.velocity || (t.velocity->linear.allFinite() && t.velocity->angular.allFinite()));
 }
 
-/// The bodies, and the rods that may meet something.
-WorldContent rodsAndBodies(const WorldModel& world, WorldContent content)
-{
-  const auto alone = [&](int rod) { return !meetsOthers(world, rod); };
-  content.rods.erase(std::remove_if(content.rods.begin(), content.rods.end(), alone), content.rods.end());
-  content.threads.clear();
-  content.cloths.clear();
-  return content;
-}
-
 }   // namespace
+
+IslandFinder::Reach reachOf(const std::optional<ContactProperties>& contact)
+{
+  return {contact.has_value(), contact && contact->others, contact && contact->solids, false, BoundingBox::empty()};
+}
 
 bool refuseInput(const std::string& what, StepReport& report)
 {
@@ -35,31 +30,39 @@ bool refuseInput(const std::string& what, StepReport& report)
 
 // ---- what there is
 
-WorldObjects::WorldObjects(const WorldModel& model, WorldContent parts, WorldState& state)
-  : world(model),
-    content(std::move(parts))
+WorldObjects::WorldObjects(const WorldModel& model, bool leaders, WorldState& state) : world(model)
 {
-  addObjects(world.time);
-  addWelds(state);
+  if (!leaders)
+  {
+    addBodies();
+    for (int r = 0; r < static_cast<int>(world.rods.size()); ++r)
+      addRod(r, world.time);
+  }
+  addCloths(leaders);
+  if (!leaders)
+  {
+    addThreads();
+    addWelds(state);
+  }
   if (!touch())
     return;
   state.contact.rods.resize(world.rods.size());
   state.contact.threads.resize(world.threads.size());
   state.contact.bodies.resize(world.bodies.size());
   state.contact.cloths.resize(world.cloths.size());
-  addSolids();
+  addSolids(!leaders);
 }
 
-WorldObjects::WorldObjects(const WorldObjects& other, const TimeConfig& time)
-  : world(other.world),
-    content(rodsAndBodies(other.world, other.content)),
-    welds(other.welds)
+WorldObjects::WorldObjects(const WorldObjects& other, const TimeConfig& time) : world(other.world), welds(other.welds)
 {
-  addObjects(time);
+  addBodies();
+  for (const RodObject& rod : other.rods)
+    if (rod.meets)
+      addRod(rod.index, time);
   for (const Weld& weld : welds)
     follow(weld);
   if (touch())
-    addSolids();
+    addSolids(true);
 }
 
 // ---- solids
@@ -86,17 +89,41 @@ ContactSolid WorldSolid::asTouched(const std::vector<WorldObject*>& by) const
 
 // ---- all of them
 
-void WorldObjects::addObjects(const TimeConfig& time)
+void WorldObjects::addBodies()
 {
-  for (const int b : content.bodies)
+  for (int b = 0; b < static_cast<int>(world.bodies.size()); ++b)
     if (world.bodies[b].body.simulated)
+    {
+      checkBody(world.bodies[b].body);
       add(bodies.emplace_back(world, b));
-  for (const int r : content.rods)
-    built(FailurePlace::Kind::rod, r, [&] { add(rods.emplace_back(world, r, time)); });
-  for (const int c : content.cloths)
-    built(FailurePlace::Kind::cloth, c, [&] { add(cloths.emplace_back(world, c)); });
-  for (const int k : content.threads)
-    add(threads.emplace_back(world, k));
+    }
+}
+
+void WorldObjects::addRod(int number, const TimeConfig& time)
+{
+  built(FailurePlace::Kind::rod, number, [&] { add(rods.emplace_back(world, number, time)); });
+}
+
+void WorldObjects::addCloths(bool leaders)
+{
+  std::vector<int> by_impulses;
+  for (int c = 0; c < static_cast<int>(world.cloths.size()); ++c)
+  {
+    if (world.leads(c) != leaders)
+      continue;
+    if (byImpulses(world.cloths[c]))
+      by_impulses.push_back(c);
+    else
+      built(FailurePlace::Kind::cloth, c, [&] { add(cloths.emplace_back(world, c)); });
+  }
+  if (!by_impulses.empty())
+    add(impulses.emplace(world, std::move(by_impulses)));
+}
+
+void WorldObjects::addThreads()
+{
+  for (int k = 0; k < static_cast<int>(world.threads.size()); ++k)
+    built(FailurePlace::Kind::thread, k, [&] { add(threads.emplace_back(world, k)); });
 }
 
 void WorldObjects::add(WorldObject& object)
@@ -111,26 +138,15 @@ bool WorldObjects::touch() const
   return std::any_of(all.begin(), all.end(), [](const WorldObject* object) { return object->hasSurface(); });
 }
 
-const BodyObject* WorldObjects::simulated(int body) const
-{
-  for (const BodyObject& b : bodies)
-    if (b.index == body)
-      return &b;
-  return nullptr;
-}
-
 void WorldObjects::addWelds(WorldState& state)
 {
   for (const WorldModel::RodWeld& weld : world.welds)
   {
-    const auto at = std::find_if(rods.begin(), rods.end(), [&](const RodObject& rod) { return rod.index == weld.rod; });
-    if (at == rods.end())
-      continue;
     RodState& rod = state.rods[weld.rod];
     GraspState grasp = makeGrasp(*world.rods[weld.rod].model, rod, weld.first_node, weld.last_node, true);
-    grasp.body = simulated(weld.body) ? weld.body : -1;
+    grasp.body = world.bodies[weld.body].body.simulated ? weld.body : -1;
     const Pose X_BG = weld.X_BG.value_or(state.bodies[weld.body].X_WB.inverse() * grasp.X_WG);
-    welds.push_back({static_cast<int>(at - rods.begin()), static_cast<int>(rod.grasps.size()), weld.body, X_BG});
+    welds.push_back({weld.rod, static_cast<int>(rod.grasps.size()), weld.body, X_BG});
     follow(welds.back());
     rod.grasps.push_back(grasp);
   }
@@ -138,29 +154,30 @@ void WorldObjects::addWelds(WorldState& state)
 
 void WorldObjects::follow(const Weld& weld)
 {
-  const BodyObject* body = simulated(weld.body);
+  const BodyObject* body = findObject(bodies, weld.body);
   if (!body)
     return;
-  rods[weld.rod].part->addWeld({weld.grasp, body->part.get(), weld.X_BG});
-  joined.emplace_back(rods[weld.rod].place, body->place);
+  const RodObject& rod = *findObject(rods, weld.rod);
+  rod.part->addWeld({weld.grasp, body->part.get(), weld.X_BG});
+  joined.emplace_back(rod.place, body->place);
 }
 
-void WorldObjects::addSolids()
+void WorldObjects::addSolids(bool with_bodies)
 {
   for (std::size_t k = 0; k < world.obstacles.size(); ++k)
     solids.push_back({WorldSolid::Kind::obstacle, static_cast<int>(k), world.obstacles[k]});
-  for (const int b : content.bodies)
+  for (int b = 0; with_bodies && b < static_cast<int>(world.bodies.size()); ++b)
   {
     const WorldModel::Body& body = world.bodies[b];
     if (!body.shape)
       continue;
-    const BodyObject* carrier = simulated(b);
+    const BodyObject* carrier = findObject(bodies, b);
     solids.push_back({WorldSolid::Kind::body, b, body.solid(), carrier ? carrier->part.get() : nullptr, body.X_BS});
     if (carrier)
       solids.back().ignores.push_back(carrier);
     for (const Weld& weld : welds)
       if (weld.body == b)
-        solids.back().ignores.push_back(&rods[weld.rod]);
+        solids.back().ignores.push_back(findObject(rods, weld.rod));
   }
   for (const ThreadObject& thread : threads)
     if (const ThreadFloor& floor = thread.model.model->floor; floor.slips())
@@ -183,13 +200,13 @@ std::string WorldObjects::badInput(const WorldState& state, const WorldInputs& i
   if (inputs.obstacles.size() != state.obstacles.size() || state.obstacles.size() != world.obstacles.size() ||
       state.obstacle_velocities.size() != state.obstacles.size())
     return "number of obstacles";
-  for (const int b : content.bodies)
+  for (std::size_t b = 0; b < inputs.bodies.size(); ++b)
     if (!world.bodies[b].body.simulated && !isSound(inputs.bodies[b]))
       return "pose of body " + world.bodies[b].body.name;
   for (std::size_t k = 0; k < inputs.obstacles.size(); ++k)
     if (!isSound(inputs.obstacles[k]))
       return "pose of obstacle " + world.obstacles[k].name;
-  for (const int k : content.threads)
+  for (std::size_t k = 0; k < inputs.threads.size(); ++k)
     if (!inputs.threads[k].belt_velocity.allFinite())
       return "belt velocity of thread " + world.threads[k].model->name;
   return inputs.gravity.allFinite() ? "" : "gravity";
@@ -200,7 +217,7 @@ void WorldObjects::carryGrasps(const WorldInputs& inputs)
 {
   for (const Weld& weld : welds)
   {
-    std::vector<GraspTarget>& grasps = rods[weld.rod].inputs.grasps;
+    std::vector<GraspTarget>& grasps = findObject(rods, weld.rod)->inputs.grasps;
     if (!world.bodies[weld.body].body.simulated && weld.grasp < static_cast<int>(grasps.size()))
     {
       const GraspTarget& body = inputs.bodies[weld.body];
@@ -225,6 +242,19 @@ bool WorldObjects::takeInputs(const WorldState& state, const WorldInputs& inputs
     if (!rod.stepper->inputsFinite(state.rods[rod.index], rod.inputs, what))
       return refuseInput("rod '" + rod.stepper->model->name + "': " + what, report);
   return true;
+}
+
+void moveGiven(const WorldModel& world, const WorldInputs& inputs, double duration, WorldState& state)
+{
+  const auto move = [duration](const GraspTarget& target, Pose& pose, Twist& velocity) {
+    const Twist start = velocity;
+    pose = poseBetween(pose, start, target, duration, 1.0, &velocity);
+  };
+  for (std::size_t b = 0; b < state.bodies.size(); ++b)
+    if (!world.bodies[b].body.simulated)
+      move(inputs.bodies[b], state.bodies[b].X_WB, state.bodies[b].velocity);
+  for (std::size_t k = 0; k < state.obstacles.size(); ++k)
+    move(inputs.obstacles[k], state.obstacles[k], state.obstacle_velocities[k]);
 }
 
 }   // namespace slender

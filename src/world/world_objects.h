@@ -1,11 +1,14 @@
 #pragma once
 
+#include <algorithm>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "body_object.h"
 #include "cloth_object.h"
+#include "impulse_cloths.h"
 #include "rod_object.h"
 #include "thread_object.h"
 #include "slender_sim/world/world_model.h"
@@ -38,20 +41,20 @@ struct WorldSolid
   ContactSolid asTouched(const std::vector<WorldObject*>& by) const;
 };
 
-/// Objects of the world, by their numbers.
-struct WorldContent
+/// The object of this kind with this number in the world; null: it is not among these. They are in ascending order.
+template <class Objects>
+auto* findObject(Objects& objects, int number)
 {
-  std::vector<int> rods;   ///< those that may meet something come first
-  std::vector<int> threads;
-  std::vector<int> bodies;   ///< simulated ones, and driven ones that something is welded to or that have a shape
-  std::vector<int> cloths;   ///< that do not collide by impulses
-};
+  const auto at = std::lower_bound(objects.begin(), objects.end(), number,
+                                   [](const WorldObject& object, int n) { return object.index < n; });
+  return at != objects.end() && at->index == number ? &*at : nullptr;
+}
 
 struct WorldObjects
 {
-  /// Appends the grasps of the welds to the rods of the state, and makes room for what contact keeps. The model
-  /// of the world must live as long.
-  WorldObjects(const WorldModel& world, WorldContent content, WorldState& state);
+  /// The cloths that lead others, or all other objects. Appends the grasps of the welds to the rods of the state, and
+  /// makes room for what contact keeps. The model of the world must live as long.
+  WorldObjects(const WorldModel& world, bool leaders, WorldState& state);
   /// The bodies, and the rods that may meet something, for steps of another kind. The state has the grasps of the
   /// welds.
   WorldObjects(const WorldObjects& other, const TimeConfig& time);
@@ -62,29 +65,32 @@ struct WorldObjects
   bool takeInputs(const WorldState& state, const WorldInputs& inputs, StepReport& report);
 
   const WorldModel& world;
-  const WorldContent content;
   std::deque<BodyObject> bodies;
   std::deque<RodObject> rods;
-  std::deque<ClothObject> cloths;
+  std::deque<ClothObject> cloths;   ///< that do not collide by impulses
   std::deque<ThreadObject> threads;
+  std::optional<ImpulseCloths> impulses;   ///< nothing: no cloth collides by impulses
   /// All of them in this order. Bodies come first, because rods follow them.
   std::vector<WorldObject*> all;
-  std::vector<Weld> welds;                   ///< rod: place in `rods`; body: number in the world
+  std::vector<Weld> welds;                   ///< rod and body: numbers in the world
   std::vector<std::pair<int, int>> joined;   ///< places in `all` of rods and simulated bodies that welds join
   std::vector<WorldSolid> solids;
 
-  /// Null: the body is driven.
-  const BodyObject* simulated(int body) const;
-
 private:
-  void addObjects(const TimeConfig& time);
+  void addBodies();
+  void addRod(int number, const TimeConfig& time);
+  void addCloths(bool leaders);
+  void addThreads();
   void add(WorldObject& object);
   bool touch() const;
   void addWelds(WorldState& state);
-  void addSolids();
+  void addSolids(bool with_bodies);
   void follow(const Weld& weld);
   std::string badInput(const WorldState& state, const WorldInputs& inputs) const;
   void carryGrasps(const WorldInputs& inputs);
 };
+
+/// Moves bodies and obstacles that are driven to where they are at the end of a step of this duration [s].
+void moveGiven(const WorldModel& world, const WorldInputs& inputs, double duration, WorldState& state);
 
 }   // namespace slender

@@ -77,11 +77,9 @@ WorldStatics::WorldStatics(WorldObjects& objects)
 void WorldStatics::copy(const WorldState& from, WorldState& to) const
 {
   to.rods.resize(from.rods.size());
-  to.bodies.resize(from.bodies.size());
   for (const RodObject& rod : objects_.rods)
     to.rods[rod.index] = from.rods[rod.index];
-  for (const int b : objects_.content.bodies)
-    to.bodies[b] = from.bodies[b];
+  to.bodies = from.bodies;
   to.obstacles = from.obstacles;
   to.obstacle_velocities = from.obstacle_velocities;
   to.contact = from.contact;
@@ -149,14 +147,7 @@ StepReport WorldStatics::step(double h)
   takeParts();
   island_.end(work_);
   forgetSprings();
-  const auto arrive = [h](const GraspTarget& target, Pose& pose, const Twist& velocity) {
-    pose = poseBetween(pose, velocity, target, h, 1.0, nullptr);
-  };
-  for (const int b : objects_.content.bodies)
-    if (!objects_.world.bodies[b].body.simulated)
-      arrive(inputs_->bodies[b], work_.bodies[b].X_WB, work_.bodies[b].velocity);
-  for (std::size_t k = 0; k < work_.obstacles.size(); ++k)
-    arrive(inputs_->obstacles[k], work_.obstacles[k], work_.obstacle_velocities[k]);
+  moveGiven(objects_.world, *inputs_, h, work_);
   return report;
 }
 
@@ -244,8 +235,8 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
     settleStably(true);
     report_.message.clear();
     copy(work_, state);
-    for (std::size_t r = 0; r < objects_.rods.size(); ++r)
-      origin_.rods[r].stepper->wrenches = objects_.rods[r].stepper->wrenches;
+    for (const RodObject& rod : objects_.rods)
+      findObject(origin_.rods, rod.index)->stepper->wrenches = rod.stepper->wrenches;
     return report_;
   }
   return report_.refuse(failure_, report_.message.empty() ? explainStatics(failure_) : report_.message);
