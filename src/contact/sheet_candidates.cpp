@@ -299,12 +299,13 @@ void SheetCandidates::findOnSolid(const ContactSurface& surface, const std::vect
     const SheetPieces::Face& face = faces[f];
     const Ball& ball = balls[f];
     // how far a point of the face may come nearer, seen from the solid
-    const double far2 = (ball.middle - pose.position).squaredNorm(), nearer = ball.moved + shift,
-                 still = slack.gap + face.radius + nearer + turn * (ball.half + nearer),
-                 near = reach + ball.half + still;
+    // The distance at which a point of the face may still touch the solid, because both move and the solid turns: the
+    // sum of a part that is the same at all distances and of the turn of the ball's middle.
+    const double far2 = (ball.middle - pose.position).squaredNorm(), moved = ball.moved + shift,
+                 same = slack.gap + face.radius + moved + turn * (ball.half + moved), near = reach + ball.half + same;
     if ((1.0 - turn) * (1.0 - turn) * far2 > near * near && turn < 1.0)
       continue;
-    const double range = still + turn * std::sqrt(far2);
+    const double range = same + turn * std::sqrt(far2);
     if (!mayTouch(surface, face.object, properties) ||
         passesThrough(surface, face.object, face.corner.data(), face.corners, properties))
       continue;
