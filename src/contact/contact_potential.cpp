@@ -357,7 +357,7 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   for (BarrierStiffness& own : impl_->stiffness)
     own.beginStep();
   impl_->lagFriction();
-  impl_->beginFollowing();   // The change from no friction at all tells nothing of alternation.
+  impl_->beginFollowing();   // The first friction replaces none, so that its change does not count as alternation.
 }
 
 void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids,

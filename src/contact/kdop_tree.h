@@ -24,7 +24,7 @@ struct Kdop
       high[k] = high[k] > b.high[k] ? high[k] : b.high[k];
     }
   }
-  /// By a distance [m] on all sides.
+  /// Moves all sides outwards by this distance [m].
   void enlarge(float by)
   {
     constexpr float kDiagonal = 1.4142137f;   // rounded up

@@ -51,11 +51,11 @@ public:
   const std::vector<OnSolid>& onSolids() const { return on_solids_; }
 
 private:
-  /// Around a face.
+  /// A ball around a face.
   struct Ball
   {
     Eigen::Vector3d middle;
-    double half, moved;   ///< its radius where the motion begins, and how far a corner moves [m]
+    double half, moved;   ///< radius when the motion begins; largest way of a corner [m]
   };
   void buildTree(const ContactSurface& surface, const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
   void setSkins(const SheetPieces& pieces, const Eigen::Matrix3Xd& x);
@@ -85,7 +85,7 @@ private:
   std::vector<int> edge_counts_;
   std::vector<double> strays_;   ///< of points: how far they get from where the mean motion takes them, and the margin
   std::vector<Kdop> points_;     ///< volumes of points during the motion, in the frame of their mean
-  std::vector<Kdop> known_;      ///< the same with skins, when the neighbours of a point were sought; or empty
+  std::vector<Kdop> known_;      ///< the same with skins, as they were when the neighbours were sought; empty at first
   std::vector<Kdop> volumes_;    ///< of elements, around those in known_
   std::vector<char> left_;       ///< points that are not within their volumes in known_
   std::vector<std::uint64_t> neighbours_;       ///< pairs as numbers, in the order of pairs()

@@ -24,7 +24,7 @@ IslandScheduler::IslandScheduler(const WorldModel& world, bool leaders, WorldSta
   checkClearance(state);
 }
 
-/// Throws std::invalid_argument if the integrator of the world is not one for what its objects may meet.
+/// Throws std::invalid_argument if the integrator of the world cannot step contacts that its objects may have.
 void IslandScheduler::checkIntegrator() const
 {
   const auto any = [](const auto& objects, const auto& is) { return std::any_of(objects.begin(), objects.end(), is); };

@@ -90,7 +90,7 @@ private:
   void carryGrasps(const WorldInputs& inputs);
 };
 
-/// Moves bodies and obstacles that are driven to where they are at the end of a step of this duration [s].
+/// Moves driven bodies and obstacles to the poses that they have at the end of a step of this duration [s].
 void moveGiven(const WorldModel& world, const WorldInputs& inputs, double duration, WorldState& state);
 
 }   // namespace slender

@@ -50,8 +50,8 @@ std::vector<Piece> nearPairs(const ContactSurface& surface, const SheetPieces& p
   return names;
 }
 
-/// The candidates of many motions, one after the other, are those of a new search, and nothing near is missing. The
-/// motions take points out of their skins or not, one by one or all together.
+/// One object looks for the candidates of many motions in turn. In each it finds the same pairs as a new object, and
+/// all pairs that are near. In some motions a few points leave their skins, in some all points do, and in some none.
 TEST(SheetCandidates, ForgetNothingWhileTheListOfNeighboursIsKept)
 {
   Random random(5);
@@ -89,7 +89,7 @@ TEST(SheetCandidates, ForgetNothingWhileTheListOfNeighboursIsKept)
     }
     x = x_end;
   }
-  EXPECT_GT(near, 1000u);   // so that the check says something
+  EXPECT_GT(near, 1000u);   // Without near pairs the check would prove nothing.
 }
 
 }   // namespace
