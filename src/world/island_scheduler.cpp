@@ -87,7 +87,7 @@ Eigen::Matrix3Xd IslandScheduler::clothContactForces(int number) const
 {
   const ClothObject* cloth = findObject(objects_.cloths, number);
   if (!cloth)
-    return objects_.impulses->group().contactForces(objects_.impulses->placeOf(number));
+    return objects_.impulses->contactForces(number);
   Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, cloth->part().points());
   addContactForces(*cloth, cloth->part(), forces);
   return forces;
@@ -97,14 +97,14 @@ ClothEnergies IslandScheduler::clothEnergies(int number, const ClothState& state
 {
   if (const ClothObject* cloth = findObject(objects_.cloths, number))
     return cloth->part().work().energies(state, gravity);
-  return objects_.impulses->group().stepper(objects_.impulses->placeOf(number)).energies(state, gravity);
+  return objects_.impulses->energies(number, state, gravity);
 }
 
 const Eigen::Matrix3Xd& IslandScheduler::pinForces(int number) const
 {
   if (const ClothObject* cloth = findObject(objects_.cloths, number))
     return cloth->part().work().pin_forces;
-  return objects_.impulses->group().pinForces(objects_.impulses->placeOf(number));
+  return objects_.impulses->pinForces(number);
 }
 
 // ---- statics

@@ -35,7 +35,10 @@ void takeClothInputs(const WorldModel& model, int cloth, const WorldState& state
   to.wind = from.wind;
   to.forces = from.forces;
   if (!model.cloths[cloth].tracked.sets)
+  {
+    to.averages = from.averages;
     return;
+  }
   functionsOf(model.cloths[cloth].tracked, state.cloths[cloth])
       .constraints->averages(guideOf(model, cloth, state, inputs), to.averages);
   state.cloth_guides[cloth].blend.apply(static_cast<double>(state.steps + 1) * model.time.step, to.averages);

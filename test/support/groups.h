@@ -7,8 +7,16 @@
 
 namespace slender::test {
 
-/// Rods, bodies and obstacles under construction, with inputs that hold everything held where it is: the model of a
-/// world, its state and its inputs, without a scene.
+inline ContactProperties impulseContact(double thickness = 1e-3)
+{
+  ContactProperties contact;
+  contact.thickness = thickness;
+  contact.method = ContactMethod::impulses;
+  return contact;
+}
+
+/// Rods, cloths, bodies and obstacles under construction, with inputs that hold everything held where it is: the model
+/// of a world, its state and its inputs, without a scene.
 struct Group
 {
   WorldModel model;
@@ -22,6 +30,15 @@ struct Group
     inputs.rods.push_back(rod.inputs);
     inputs.gravity = rod.inputs.gravity;
     return static_cast<int>(model.rods.size()) - 1;
+  }
+  int addCloth(const std::shared_ptr<const ClothModel>& cloth, const ClothState& start,
+               const ClothOptions& options = {}, const ContactProperties& contact = impulseContact(),
+               const ClothInputs& input = {})
+  {
+    model.cloths.push_back({cloth, options, contact, {}, {}});
+    state.cloths.push_back(start);
+    inputs.cloths.push_back(input);
+    return static_cast<int>(model.cloths.size()) - 1;
   }
   int addBody(const RigidBodyModel& body, const Pose& pose, const Twist& velocity = {})
   {

@@ -1,10 +1,11 @@
 // Bounds of the forces by which a cloth gets its prescribed averages.
 #include <gtest/gtest.h>
 
-#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/tracking/weak_constraints.h"
 #include "test/support/cloths.h"
+#include "test/support/groups.h"
+#include "world/impulse_cloths.h"
 
 namespace slender::test {
 namespace {
@@ -33,6 +34,20 @@ struct Bounded
     options.one_newton_step = true;
     state = makeClothState(*model, fine.mesh.vertices);
     inputs.pins.resize(3, 0);
+  }
+
+  /// Returns a world in which the cloth follows its guide and meets a solid.
+  Group beside(const Shape& solid, const Vector3d& at) const
+  {
+    Group g;
+    g.addCloth(model, state, options, impulseContact(), inputs);
+    auto sets = std::make_shared<std::vector<FunctionSet>>(1);
+    sets->front().constraints = std::make_shared<WeakConstraints>(constraints);
+    g.model.cloths[0].tracked.sets = sets;
+    g.state.cloth_guides.resize(1);
+    g.inputs.cloth_guides.resize(1);
+    g.addObstacle(solid, {at, Eigen::Quaterniond::Identity()});
+    return g;
   }
 
   Matrix3Xd stretched(double factor) const
@@ -187,25 +202,22 @@ TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
   for (const double traction : {0.0, 20.0})
   {
     Bounded t(traction);
-    ClothGroupModel model;
-    model.cloths = {t.model};
-    model.contact.resize(1);
-    Obstacle floor;
-    floor.shape = Plane{};
-    model.solids.push_back(floor);
-    ClothGroup group(model, t.options);
-    ClothGroupState state{{t.state}, {{{0, 0, -0.01}, Eigen::Quaterniond::Identity()}}};
-    ClothGroupInputs inputs{{t.inputs}, state.solids};
+    Group g = t.beside(Plane{}, {0, 0, -0.01});
+    g.model.time.step = 0.01;
+    ImpulseCloths cloths(g.model, {0});
     for (int k = 1; k <= 20; ++k)
     {
-      inputs.cloths[0].averages = t.constraints.averages(t.coarse.vertices.colwise() - Vector3d(0, 0, 0.002 * k));
-      const StepReport report = group.step(state, inputs, 0.01);
+      g.inputs.cloth_guides[0] = t.coarse.vertices.colwise() - Vector3d(0, 0, 0.002 * k);
+      StepReport report;
+      ASSERT_TRUE(cloths.load(g.state, g.inputs, report));
+      report = *cloths.stepAlone();
       ASSERT_TRUE(report.ok) << report.message;
-      EXPECT_GT(state.cloths[0].x.row(2).minCoeff(), -0.01);
-      EXPECT_LT(group.collisions().rounds, 60) << traction << " step " << k;
+      cloths.finish(g.state);
+      EXPECT_GT(g.state.cloths[0].x.row(2).minCoeff(), -0.01);
+      EXPECT_LT(cloths.collisions().rounds, 60) << traction << " step " << k;
     }
-    EXPECT_GT(t.constraints.error(inputs.cloths[0].averages, state.cloths[0].x), 0.029);
-    EXPECT_EQ(state.cloths[0].at_bound.size(), traction > 0 ? 25u : 0u);
+    EXPECT_GT(t.constraints.error(t.constraints.averages(g.inputs.cloth_guides[0]), g.state.cloths[0].x), 0.029);
+    EXPECT_EQ(g.state.cloths[0].at_bound.size(), traction > 0 ? 25u : 0u);
   }
 }
 
@@ -259,26 +271,19 @@ TEST(BoundedAverages, HoldInContactWhateverTheTolerance)
   {
     Bounded t(20.0);
     t.options.linear_tolerance = tolerance;
-    ClothGroupModel model;
-    model.cloths = {t.model};
-    model.contact.resize(1);
-    Obstacle ball;
-    ball.shape = Sphere{0.1};
-    model.solids.push_back(ball);
-    ClothGroup group(model, t.options);
-    ClothGroupState state{{t.state}, {{{0.25, 0.25, -0.11}, Eigen::Quaterniond::Identity()}}};
-    ClothGroupInputs inputs{{t.inputs}, state.solids};
+    Group g = t.beside(Sphere{0.1}, {0.25, 0.25, -0.11});
+    World world = g.world({}, 0.01);
     int contacts = 0;
     double greatest = 0.0;
     for (int k = 1; k <= 40; ++k)
     {
-      inputs.cloths[0].averages = t.constraints.averages(t.coarse.vertices.colwise() - Vector3d(0, 0, 0.003 * k));
-      const StepReport report = group.step(state, inputs, 0.01);
+      g.inputs.cloth_guides[0] = t.coarse.vertices.colwise() - Vector3d(0, 0, 0.003 * k);
+      const StepReport report = world.step(g.state, g.inputs);
       ASSERT_TRUE(report.ok) << report.message;
       contacts += report.repulsions;
+      const Matrix3Xd& forces = g.state.cloth_guides[0].forces;
       greatest = std::max(
-          greatest, (group.averageForces(0).colwise().norm().transpose().array() / t.model->averages[0].bounds.array())
-                        .maxCoeff());
+          greatest, (forces.colwise().norm().transpose().array() / t.model->averages[0].bounds.array()).maxCoeff());
     }
     EXPECT_GT(greatest, 0.99) << tolerance;
     EXPECT_LT(greatest, 1.0011) << tolerance;

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/cloth/cloth_group.h"
 #include "test/support/cloths.h"
+#include "test/support/groups.h"
 
 namespace slender::test {
 namespace {
@@ -262,38 +262,30 @@ TEST(ClothPlasticity, FreeMotionLosesEnergy)
   EXPECT_GT(state.rest_angles.cwiseAbs().maxCoeff(), 0.01);
 }
 
-/// In a group the flow of a step is that of the shape that collisions left.
+/// With collisions the flow of a step is that of the shape that collisions left.
 TEST(ClothPlasticity, FlowsFromWhatCollisionsLeave)
 {
-  ClothGroupModel group;
+  Group g;
   auto model = std::make_shared<ClothModel>(plasticStrip({0.5, 0.2, 0.0}));
-  group.cloths.push_back(model);
-  group.contact.push_back({true, true, true, 0.3, 4e-3});
-  group.solids.push_back({Capsule{0.02, 0.3}, 0.3, {}});
-  ClothGroup stepper(group, {});
-  ClothGroupState state;
-  state.cloths.push_back(makeClothState(*model, model->rest.vertices));
-  state.solids.resize(1);
-  state.solids[0].position << 0.05, 0.15, -0.03;
-  state.solids[0].orientation = Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitY()));
-  ClothGroupInputs inputs;
-  inputs.cloths.resize(1);
-  inputs.solids = state.solids;
+  g.addCloth(model, makeClothState(*model, model->rest.vertices), {}, impulseContact(4e-3));
+  g.addObstacle(Capsule{0.02, 0.3},
+                {{0.05, 0.15, -0.03}, Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitY()))}, 0.3);
+  World world = g.world({}, 5e-3);
   PlasticFlow plastic(*model);
   int touched = 0;
   for (int k = 0; k < 40; ++k)
   {
-    ClothState expected = state.cloths[0];
+    ClothState expected = g.state.cloths[0];
     plastic.flow(expected, 5e-3);
-    const StepReport report = stepper.step(state, inputs, 5e-3);
+    const StepReport report = world.step(g.state, g.inputs);
     ASSERT_TRUE(report.ok) << report.message;
     if (report.cut_steps > 0)
       continue;
-    EXPECT_EQ(state.cloths[0].rest_angles, expected.rest_angles);
-    touched += stepper.collisions().repulsions + stepper.collisions().impulses > 0;
+    EXPECT_EQ(g.state.cloths[0].rest_angles, expected.rest_angles);
+    touched += report.repulsions + report.impulses > 0;
   }
   EXPECT_GT(touched, 5);
-  EXPECT_GT(state.cloths[0].rest_angles.cwiseAbs().maxCoeff(), 0.01);
+  EXPECT_GT(g.state.cloths[0].rest_angles.cwiseAbs().maxCoeff(), 0.01);
 }
 
 TEST(ClothPlasticity, RefusesWhatIsNotValid)

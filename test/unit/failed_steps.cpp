@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/scene/state_bytes.h"
 #include "slender_sim/tracking/weak_constraints.h"
@@ -35,6 +34,8 @@ std::string bytesOf(const WorldState& s)
     bytes += stateBytes(thread);
   for (const slender::ContactMemory& memory : s.contact.threads)
     bytes += std::to_string(memory.stiffness);
+  for (const ClothState& cloth : s.cloths)
+    bytes += stateBytes(cloth);
   if (s.rods.empty())
     return bytes;
   SceneState scene;   // stateBytes() takes the state of a scene; that of a world counts its steps
@@ -51,14 +52,6 @@ struct WorldStepper
   std::unique_ptr<World> world;
   StepReport step(WorldState& state, const WorldInputs& inputs, double) { return world->step(state, inputs); }
 };
-std::string bytesOf(const ClothGroupState& s)
-{
-  std::string bytes;
-  for (const ClothState& cloth : s.cloths)
-    bytes += stateBytes(cloth);
-  return bytes;
-}
-
 /// Expects that a step whose first substep fails, and whose two halves succeed, ends like two steps of half its length
 /// of a new stepper. The step length (at most `longest` [s]) and the limit of Newton iterations are varied until such a
 /// step is found. `make(newton, h)` returns a stepper for steps of h, and `step(stepper, state, h)` takes one step with
@@ -418,21 +411,15 @@ TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
                   what, state, inputs, spoilt, h, [&] { return ClothStepper(shared, options); });
               continue;
             }
-            ClothGroupModel group;
-            group.cloths.push_back(shared);
-            group.contact.emplace_back();
-            group.contact.back().thickness = 4e-3;
-            group.solids.push_back({Sphere{0.1}, -1.0, {}});
-            ClothGroupState group_state;
-            group_state.cloths.push_back(state);
-            group_state.solids.push_back({Vector3d(0.15, 0.15, -0.1045), Eigen::Quaterniond::Identity()});
-            ClothGroupInputs group_inputs, group_spoilt;
-            group_inputs.cloths.push_back(inputs);
-            group_inputs.solids = group_state.solids;
-            group_spoilt = group_inputs;
-            group_spoilt.cloths[0] = spoilt;
-            expectRefusalLeavesNothing<ClothGroupState, ClothGroupInputs, ClothGroup>(
-                what, group_state, group_inputs, group_spoilt, h, [&] { return ClothGroup(group, options); });
+            Group g;
+            g.addCloth(shared, state, options, impulseContact(4e-3), inputs);
+            g.addObstacle(Sphere{0.1}, {Vector3d(0.15, 0.15, -0.1045), Eigen::Quaterniond::Identity()});
+            g.model.time.step = h;
+            WorldInputs world_spoilt = g.inputs;
+            world_spoilt.cloths[0] = spoilt;
+            expectRefusalLeavesNothing<WorldState, WorldInputs, WorldStepper>(
+                what, g.state, g.inputs, world_spoilt, h,
+                [&] { return WorldStepper{std::make_unique<World>(g.model, g.state)}; });
           }
 }
 

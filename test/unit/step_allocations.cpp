@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/fairing/willmore_flow.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/linalg/banded_ldlt.h"
@@ -333,26 +332,26 @@ TEST_P(ClothAllocations, AWarmStepMakesNone)
 /// once as long as they get.
 TEST_P(ClothAllocations, AWarmStepInContactMakesNone)
 {
-  ClothGroupModel model;
-  model.cloths = {GetParam().model()};
-  model.contact.resize(1);
-  model.solids.push_back({Sphere{0.05}, -1.0, {}});
-  ClothGroup group(model, GetParam().options());
-  ClothGroupState state;
-  state.cloths = {makeClothState(*model.cloths[0], model.cloths[0]->rest.vertices)};
-  pinVertices(state.cloths[0], {0, 8});
+  const auto model = GetParam().model();
+  ClothState state = makeClothState(*model, model->rest.vertices);
+  pinVertices(state, {0, 8});
   if (GetParam().isExplicit())   // whose few short steps would not get there
-    state.cloths[0].v.row(2).setConstant(-5.0);
-  state.solids.resize(1);
-  state.solids[0].position = state.cloths[0].x.rowwise().mean() - Vector3d(0, 0, 0.0506);
-  ClothGroupInputs inputs;
-  inputs.cloths.resize(1);
-  inputs.cloths[0].pins.resize(3, 2);
-  inputs.cloths[0].pins << state.cloths[0].x.col(0), state.cloths[0].x.col(8);
-  inputs.solids = state.solids;
-  const double h = GetParam().step();
-  expectNone([&] { return group.step(state, inputs, h).ok; }, 20);
-  EXPECT_GT(group.collisions().repulsions + group.collisions().impulses, 0);
+    state.v.row(2).setConstant(-5.0);
+  ClothInputs inputs;
+  inputs.pins.resize(3, 2);
+  inputs.pins << state.x.col(0), state.x.col(8);
+  Group g;
+  g.addCloth(model, state, GetParam().options(), impulseContact(), inputs);
+  g.addObstacle(Sphere{0.05}, {state.x.rowwise().mean() - Vector3d(0, 0, 0.0506), Eigen::Quaterniond::Identity()});
+  World world = g.world({}, GetParam().step());
+  StepReport report;
+  expectNone(
+      [&] {
+        report = world.step(g.state, g.inputs);
+        return report.ok;
+      },
+      20);
+  EXPECT_GT(report.repulsions + report.impulses, 0);
 }
 
 /// Rows of `parts` averages over as many equal runs of the model's vertices.
@@ -383,17 +382,12 @@ TEST(AverageAllocations, AWarmStepMakesNone)
             set.bounds.setConstant(set.count(), 0.4 / set.count());   // less than the cloth's weight
         ClothOptions options;
         options.one_newton_step = one_newton_step;
-        ClothGroupModel together;
-        together.cloths = {model};
-        together.contact.resize(1);
-        ClothGroup group(together, options);
+        Group g;
+        g.addCloth(model, makeClothState(*model, model->rest.vertices), options);
+        World world = g.world({}, 5e-3);
         ClothStepper stepper(model, options);
-        ClothGroupState state;
-        state.cloths = {makeClothState(*model, model->rest.vertices)};
-        ClothGroupInputs inputs;
-        inputs.cloths.resize(1);
-        ClothInputs& follow = inputs.cloths[0];
-        ClothState& cloth = state.cloths[0];
+        ClothInputs& follow = g.inputs.cloths[0];
+        ClothState& cloth = g.state.cloths[0];
         for (const int set : {0, 1, 0})
         {
           cloth.average_set = set;
@@ -402,7 +396,7 @@ TEST(AverageAllocations, AWarmStepMakesNone)
           bool ok = true;
           const auto advance = [&] {
             follow.averages.row(0).array() += 1e-4;
-            ok = (touching ? group.step(state, inputs, 5e-3).ok : stepper.step(cloth, follow, 5e-3).ok) && ok;
+            ok = (touching ? world.step(g.state, g.inputs).ok : stepper.step(cloth, follow, 5e-3).ok) && ok;
           };
           for (int k = 0; k < 10; ++k)
             advance();

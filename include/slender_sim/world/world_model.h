@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/cloth/cloth_stepper.h"
 #include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/contact_properties.h"
 #include "slender_sim/contact/obstacle.h"

@@ -119,7 +119,7 @@ struct WorldInputs
   Eigen::Vector3d gravity{0, 0, -9.81};   ///< of bodies [m/s^2]
   std::vector<RodInputs> rods;            ///< grasps of welds are ignored
   std::vector<ThreadInputs> threads;
-  std::vector<ClothInputs> cloths;   ///< averages are ignored: they follow from the guides
+  std::vector<ClothInputs> cloths;   ///< averages of tracked cloths are ignored: they follow from the guides
   std::vector<GraspTarget> bodies;   ///< at the end of the step; simulated ones are ignored
   std::vector<GraspTarget> obstacles;
   /// Points of the guides at the end of the step (3 x n [m]). The lists are as long as those of the state. The guide of

@@ -6,10 +6,10 @@
 #include <string>
 
 #include "collision_pairs.h"
-#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 #include "slender_sim/geometry/rotation.h"
 #include "study/framework/cpu_clock.h"
+#include "world/impulse_cloths.h"
 
 namespace slender::study {
 
@@ -21,9 +21,9 @@ using Eigen::Vector3d;
 struct Scene
 {
   std::string name;
-  ClothGroupModel model;
-  ClothGroupState state;
-  ClothGroupInputs inputs;
+  WorldModel model;
+  WorldState state;
+  WorldInputs inputs;
   double step = 5e-3;
   int steps = 200;
   /// sets the inputs of the step that ends at a time
@@ -47,20 +47,22 @@ void addCloth(Scene& s, const TriangleMesh& mesh, const Pose& pose, double frict
   Eigen::Matrix3Xd x(3, mesh.vertices.cols());
   for (Eigen::Index i = 0; i < x.cols(); ++i)
     x.col(i) = pose * Vector3d(mesh.vertices.col(i));
-  s.model.cloths.push_back(std::make_shared<ClothModel>(cloth));
   ContactProperties contact;
   contact.thickness = thickness;
   contact.friction = friction;
-  s.model.contact.push_back(contact);
+  contact.method = ContactMethod::impulses;
+  ClothOptions options;
+  options.one_newton_step = true;
+  s.model.cloths.push_back({std::make_shared<ClothModel>(cloth), options, contact, {}, {}});
   s.state.cloths.push_back(makeClothState(cloth, x));
   s.inputs.cloths.emplace_back();
 }
 
 void addSolid(Scene& s, const Shape& shape, const Pose& pose = {})
 {
-  s.model.solids.push_back({shape, -1.0, {}});
-  s.state.solids.push_back(pose);
-  s.inputs.solids.push_back(pose);
+  s.model.obstacles.push_back({shape, -1.0, {}});
+  s.state.obstacles.push_back(pose);
+  s.inputs.obstacles.push_back({pose, {}});
 }
 
 void pin(Scene& s, const std::vector<int>& vertices)
@@ -183,8 +185,8 @@ double stretch(const Scene& s)
   double most = 0.0;
   for (std::size_t k = 0; k < s.model.cloths.size(); ++k)
   {
-    const Eigen::Matrix3Xd &x = s.state.cloths[k].x, &rest = s.model.cloths[k]->rest.vertices;
-    const auto& edges = s.model.cloths[k]->topology.edges;
+    const Eigen::Matrix3Xd &x = s.state.cloths[k].x, &rest = s.model.cloths[k].model->rest.vertices;
+    const auto& edges = s.model.cloths[k].model->topology.edges;
     for (Eigen::Index e = 0; e < edges.cols(); ++e)
       most = std::max(most, (x.col(edges(1, e)) - x.col(edges(0, e))).norm() /
                                     (rest.col(edges(1, e)) - rest.col(edges(0, e))).norm() -
@@ -212,13 +214,16 @@ void runClothCollisionSafety(StudyContext& context)
   double worst_share = 0.0;
   for (Scene& s : scenes)
   {
-    ClothOptions options;
-    options.one_newton_step = true;
-    ClothGroup group(s.model, options);
+    s.model.time.step = s.step;
     std::vector<ClothStepper> alone;
+    std::vector<int> numbers;
     for (const auto& cloth : s.model.cloths)
-      alone.emplace_back(cloth, options);
-    group.checkIntersections(s.state);
+    {
+      alone.emplace_back(cloth.model, cloth.options);
+      numbers.push_back(static_cast<int>(numbers.size()));
+    }
+    ImpulseCloths together(s.model, numbers);
+    together.check(s.state);
     std::size_t found = 0;
     CollisionReport sum;
     double most_stretch = 0.0, seconds = 0.0, alone_seconds = 0.0, longest = 0.0;
@@ -236,7 +241,9 @@ void runClothCollisionSafety(StudyContext& context)
       }
       alone_seconds += threadSeconds() - start;
       start = threadSeconds();
-      const StepReport report = group.step(s.state, s.inputs, s.step);
+      StepReport report;
+      together.load(s.state, s.inputs, report);
+      report = *together.stepAlone();
       const double spent = threadSeconds() - start;
       if (!report.ok)
       {
@@ -244,10 +251,11 @@ void runClothCollisionSafety(StudyContext& context)
         context.note(s.name + ", step " + std::to_string(k) + " refused: " + report.message);
         break;
       }
+      together.finish(s.state);   // no solid moves
       seconds += spent;
       longest = std::max(longest, spent);
       cuts += report.cut_steps;
-      const CollisionReport& c = group.collisions();
+      const CollisionReport& c = together.collisions();
       sum.repulsions += c.repulsions;
       sum.impulses += c.impulses;
       sum.zones += c.zones;
@@ -256,12 +264,12 @@ void runClothCollisionSafety(StudyContext& context)
       zone_steps += c.zones > 0;
       for (const ClothState& cloth : s.state.cloths)
         not_finite += !cloth.x.allFinite() || !cloth.v.allFinite();
-      found += group.intersections(s.state);
+      found += together.intersections(s.state);
       most_stretch = std::max(most_stretch, stretch(s));
     }
     int triangles = 0;
     for (const auto& cloth : s.model.cloths)
-      triangles += static_cast<int>(cloth->rest.triangles.cols());
+      triangles += static_cast<int>(cloth.model->rest.triangles.cols());
     const double over = (seconds - alone_seconds) / alone_seconds;
     context.row()
         .set("part", "scene")

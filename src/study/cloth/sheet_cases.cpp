@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include <Eigen/Geometry>
+#include "world/impulse_cloths.h"
 
 namespace slender::study {
 
@@ -21,15 +22,19 @@ SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel b
     start.data()[i] += shift(random);
   const auto cloth = std::make_shared<ClothModel>(std::move(model));
 
-  ClothGroupModel group_model;
-  group_model.cloths = {cloth};
-  group_model.contact = {scene.contact};
-  group_model.solids = scene.solids;
-  ClothGroupState state;
+  ClothOptions options;
+  options.one_newton_step = true;
+  WorldModel model_of_world;
+  model_of_world.cloths.push_back({cloth, options, scene.contact, {}, {}});
+  model_of_world.cloths[0].contact->method = ContactMethod::impulses;
+  model_of_world.obstacles = scene.solids;
+  model_of_world.time.step = scene.step;
+  WorldState state;
   state.cloths.push_back(makeClothState(*cloth, start));
-  state.solids.resize(scene.solids.size());
-  ClothGroupInputs inputs;
-  inputs.solids = state.solids;
+  state.obstacles.resize(scene.solids.size());
+  state.obstacle_velocities.resize(scene.solids.size());
+  WorldInputs inputs;
+  inputs.obstacles.resize(scene.solids.size());
   inputs.cloths.resize(1);
   ClothInputs& input = inputs.cloths[0];
   input.gravity = scene.gravity;
@@ -39,11 +44,8 @@ SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel b
   for (std::size_t k = 0; k < state.cloths[0].pins.size(); ++k)
     input.pins.col(static_cast<Eigen::Index>(k)) = scene.start.col(state.cloths[0].pins[k]);
 
-  ClothOptions options;
-  options.one_newton_step = true;
-  ClothGroup group(group_model, options);
+  World world(model_of_world, state);
   ClothStepper alone(cloth, options);
-  group.checkIntersections(state);
   SheetRun run;
   const int steps = static_cast<int>(std::lround(scene.duration / scene.step));
   const int every = std::max(1, static_cast<int>(std::lround(scene.keep_every / scene.step)));
@@ -61,7 +63,7 @@ SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel b
       ++timed;
     }
     const double start_time = threadSeconds();
-    const StepReport report = group.step(state, inputs, scene.step);
+    const StepReport report = world.step(state, inputs);
     run.seconds_per_step += threadSeconds() - start_time;
     if (!report.ok)
       throw std::runtime_error(label + ", step " + std::to_string(k) + " refused: " + report.message);
@@ -74,7 +76,7 @@ SheetRun runSheet(StudyContext& context, const SheetScene& scene, BendingModel b
   run.seconds_per_step /= steps;
   run.cloth_seconds /= timed;
   run.speed = std::sqrt(state.cloths[0].v.squaredNorm() / static_cast<double>(start.cols()));
-  run.intersections = group.intersections(state);
+  run.intersections = ImpulseCloths(world.model(), {0}).intersections(state);
   return run;
 }
 

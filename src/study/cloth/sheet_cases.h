@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "cloth_cases.h"
-#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/world/world.h"
 #include "slender_sim/study/study.h"
 
 /// Square or rectangular sheets run with one bending model or another, all else equal, and what sets their shapes

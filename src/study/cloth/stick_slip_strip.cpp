@@ -6,7 +6,7 @@
 #include <string>
 
 #include "cloth_cases.h"
-#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/world/world.h"
 #include "slender_sim/study/study.h"
 
 namespace slender::study {
@@ -58,17 +58,26 @@ Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
   model.bending_modulus = 1.0;
   model.mass_damping = 10.0;
   model.stiffness_damping = 1e-3;
-  ClothGroupModel group_model;
-  group_model.cloths.push_back(std::make_shared<ClothModel>(model));
-  group_model.contact.push_back({false, false, true, slip.mu, kThickness});
-  group_model.solids.push_back({Plane{}, -1.0, {}});
-  ClothGroupState state;
+  ClothOptions options;
+  options.one_newton_step = true;
+  options.solver = ClothSolver::cholesky;
+  const double step = crossed * h / std::sqrt(kMembrane);
+  WorldModel model_of_world;
+  model_of_world.cloths.push_back({std::make_shared<ClothModel>(model),
+                                   options,
+                                   ContactProperties{false, false, true, slip.mu, kThickness, ContactMethod::impulses},
+                                   {},
+                                   {}});
+  model_of_world.obstacles.emplace_back();
+  model_of_world.time.step = step;
+  WorldState state;
   state.cloths.push_back(makeClothState(model, start));
   pinVertices(state.cloths[0], verticesWhere(mesh, [&](const Eigen::Vector3d& p) { return p.y() > 1.0 - 0.7 * h; }));
-  state.solids.emplace_back();
-  ClothGroupInputs inputs;
+  state.obstacles.emplace_back();
+  state.obstacle_velocities.emplace_back();
+  WorldInputs inputs;
   inputs.cloths.resize(1);
-  inputs.solids = state.solids;
+  inputs.obstacles.resize(1);
   inputs.cloths[0].gravity.setZero();
   const std::vector<int> upper = state.cloths[0].pins;
   pinVertices(state.cloths[0], verticesWhere(mesh, [](const Eigen::Vector3d& p) { return p.y() < 1e-9; }));
@@ -76,11 +85,7 @@ Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
   Eigen::Matrix3Xd held(3, static_cast<Eigen::Index>(pins.size()));
   for (std::size_t k = 0; k < pins.size(); ++k)
     held.col(static_cast<Eigen::Index>(k)) = start.col(pins[k]);
-  ClothOptions options;
-  options.one_newton_step = true;
-  options.solver = ClothSolver::cholesky;
-  ClothGroup group(group_model, options);
-  const double step = crossed * h / std::sqrt(kMembrane);
+  World world(model_of_world, state);
   Result result;
   const double begin = threadSeconds();
   double compression = 0, foot = 0, waited = 0, free = 0;
@@ -100,7 +105,7 @@ Result press(StudyContext& context, int cells, const Slip& slip, double crossed)
       compression += 0.1 * step * slip.compression;
     inputs.cloths[0].pins = held;
     inputs.cloths[0].pins.row(2).tail(static_cast<Eigen::Index>(upper.size())).array() -= compression;
-    const StepReport report = group.step(state, inputs, step);
+    const StepReport report = world.step(state, inputs);
     if (!report.ok)
       throw std::runtime_error("stick_slip_strip, mu = " + std::to_string(slip.mu) + ": " + report.message);
     if (result.steps++ % 200 == 0)

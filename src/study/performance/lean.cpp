@@ -141,7 +141,7 @@ std::vector<Feature> features()
   return {
       {"contact",
        {"src/contact/", "include/slender_sim/contact/", "src/island/confined_newton", "src/world/meeting",
-        "src/cloth/cloth_group", "include/slender_sim/cloth/cloth_group"},
+        "src/world/impulse_"},
        "[cC]ontact|[tT]ouching|[cC]ollision|[cC]ollide",
        all,
        {rod_on_floor, thread_with_itself, cloth_on_ball}},

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/world/world.h"
 #include "slender_sim/study/study.h"
 #include "study/tracking/tracking_cases.h"
 
@@ -43,11 +43,13 @@ public:
   {
     if (!collides)
       return;
-    ClothGroupModel group;
-    group.cloths = {model};
-    group.contact.resize(1);
-    group_ = std::make_unique<ClothGroup>(group, options);
-    group_inputs_.cloths.resize(1);
+    WorldModel world;
+    world.cloths.push_back({model, options, ContactProperties(), {}, {}});
+    world.cloths[0].contact->method = ContactMethod::impulses;
+    world.time.step = kTrackedStep;
+    world_state_.cloths.push_back(makeClothState(*model, model->rest.vertices));
+    world_ = std::make_unique<World>(std::move(world), world_state_);
+    world_inputs_.cloths.resize(1);
   }
 
   /// A step from the state given, which stays. Counted, and compared with an exact solution, if told so.
@@ -85,19 +87,19 @@ public:
 private:
   StepReport advance(ClothState& state, const ClothInputs& inputs)
   {
-    if (!group_)
+    if (!world_)
       return stepper_.step(state, inputs, kTrackedStep);
-    group_state_.cloths = {state};
-    group_inputs_.cloths[0] = inputs;
-    const StepReport report = group_->step(group_state_, group_inputs_, kTrackedStep);
-    state = group_state_.cloths[0];
+    world_state_.cloths = {state};
+    world_inputs_.cloths[0] = inputs;
+    const StepReport report = world_->step(world_state_, world_inputs_);
+    state = world_state_.cloths[0];
     return report;
   }
 
   ClothStepper stepper_, exact_;
-  std::unique_ptr<ClothGroup> group_;
-  ClothGroupState group_state_;
-  ClothGroupInputs group_inputs_;
+  std::unique_ptr<World> world_;
+  WorldState world_state_;
+  WorldInputs world_inputs_;
 };
 
 struct TrackingCosts

@@ -8,10 +8,10 @@
 
 #include "study/cloth/cloth_cases.h"
 #include "study/framework/scene_cases.h"
-#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_subdivision.h"
 #include "slender_sim/geometry/mesh_topology.h"
 #include "study/framework/cpu_clock.h"
+#include "world/impulse_cloths.h"
 
 namespace slender::study {
 
@@ -107,13 +107,10 @@ void runBackflip(StudyContext& context)
     const ClothConfig& cloth = config.cloths.front();
     const TriangleMesh& mesh = cloth.mesh;
     const MeshTopology topology = meshTopology(mesh);
-    ClothGroupModel alone;   // to check the output by all pairs
-    alone.cloths = {std::make_shared<const ClothModel>(scene.clothModel(0))};
-    alone.contact = {*cloth.contact};
-    ClothOptions options;
-    options.one_newton_step = cloth.one_newton_step;
-    const ClothGroup checker(alone, options);
-    ClothGroupState now;
+    WorldModel alone;   // to check the output by all pairs
+    alone.cloths.push_back({std::make_shared<const ClothModel>(scene.clothModel(0)), {}, cloth.contact, {}, {}});
+    const ImpulseCloths checker(alone, {0});
+    WorldState now;
     now.cloths.resize(1);
 
     Course course;

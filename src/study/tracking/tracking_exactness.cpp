@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include "slender_sim/cloth/cloth_group.h"
+#include "slender_sim/world/world.h"
 #include "slender_sim/study/study.h"
 #include "tracking_cases.h"
 
@@ -90,35 +90,43 @@ Result followExactly(StudyContext& context, const Scene& scene, int steps)
   const TrackedCase& c = scene.cloth;
   ClothOptions options;
   options.one_newton_step = !scene.full_newton;
-  ClothGroupModel model;
-  model.cloths = {c.model};
   ContactProperties contact;
+  contact.method = ContactMethod::impulses;
   contact.thickness = scene.thickness;
   contact.self = contact.solids = scene.contact;
-  model.contact = {contact};
-  model.solids = scene.solids;
-  ClothGroup group(model, options);
-  ClothGroupState state;
+  const auto sets = std::make_shared<std::vector<FunctionSet>>(1);
+  sets->front().constraints = c.constraints;
+  WorldModel model;
+  model.cloths.push_back({c.model, options, contact, {}, {sets}});
+  model.obstacles = scene.solids;
+  model.time.step = kExactStep;
+  WorldState state;
   state.cloths.push_back(c.start());
-  state.solids = scene.poses;
-  ClothGroupInputs inputs;
-  inputs.solids = scene.poses;
+  state.cloth_guides.resize(1);
+  state.obstacles = scene.poses;
+  state.obstacle_velocities.resize(scene.poses.size());
+  WorldInputs inputs;
+  for (const Pose& pose : scene.poses)
+    inputs.obstacles.push_back({pose, {}});
   inputs.cloths.resize(1);
   inputs.cloths[0].gravity = c.gravity;
   inputs.cloths[0].wind = c.wind;
+  inputs.cloth_guides.resize(1);
+  World world(model, state);
   const Eigen::Matrix3Xd& rest = c.guide.vertices;
   const double size = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
   Result result;
   for (int k = 1; k <= steps; ++k)
   {
     context.progress(k, steps, scene.what);
-    inputs.cloths[0].averages = c.constraints->averages(c.motion(k * kExactStep));
-    const StepReport report = group.step(state, inputs, kExactStep);
+    inputs.cloth_guides[0] = c.motion(k * kExactStep);
+    const StepReport report = world.step(state, inputs);
     if (!report.ok)
       throw std::runtime_error("tracking_exactness: " + scene.what + ", step " + std::to_string(k) + ": " +
                                report.message);
-    result.worst = std::max(result.worst, c.constraints->error(inputs.cloths[0].averages, state.cloths[0].x) / size);
-    result.force = std::max(result.force, group.averageForces(0).colwise().norm().maxCoeff());
+    const Eigen::Matrix3Xd averages = c.constraints->averages(inputs.cloth_guides[0]);
+    result.worst = std::max(result.worst, c.constraints->error(averages, state.cloths[0].x) / size);
+    result.force = std::max(result.force, state.cloth_guides[0].forces.colwise().norm().maxCoeff());
     result.contacts += report.repulsions + report.impulses;
     result.cuts += report.cut_steps;
     result.finite = result.finite && state.cloths[0].x.allFinite() && state.cloths[0].v.allFinite();

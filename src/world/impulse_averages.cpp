@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "slender_sim/cloth/cloth_group.h"
+#include "impulse_cloths.h"
 
 namespace slender {
 
@@ -18,13 +18,13 @@ constexpr int kStallRounds = 8;
 }   // namespace
 
 /// Guides press cloths into what is in their way.
-std::string ClothGroup::blameAverages(const CollisionReport& failure) const
+std::string ImpulseCloths::blameAverages(const CollisionReport& failure) const
 {
   if (failure.at_start)
     return "";
   for (const int point : failure.points)
   {
-    const ClothModel* cloth = point >= 0 && point < first_.back() ? model_.cloths[clothOf(point)].get() : nullptr;
+    const ClothModel* cloth = point >= 0 && point < vertices() ? &steppers_[clothOf(point)].model() : nullptr;
     if (cloth && !cloth->averages.empty())
       return "; the averages of cloth '" + cloth->name +
              "' are to be where its guide is, whatever is in the way: keep the guide clear of it, or " +
@@ -34,15 +34,15 @@ std::string ClothGroup::blameAverages(const CollisionReport& failure) const
 }
 
 /// What takes so much is seldom what the last substep failed at.
-void ClothGroup::blameWork(double h, StepReport& report) const
+void ImpulseCloths::blameWork(double h, StepReport& report) const
 {
-  const auto tracked = std::find_if(model_.cloths.begin(), model_.cloths.end(),
-                                    [](const auto& cloth) { return !cloth->averages.empty(); });
-  const bool guided = tracked != model_.cloths.end();
+  const auto tracked = std::find_if(steppers_.begin(), steppers_.end(),
+                                    [](const ClothStepper& s) { return !s.model().averages.empty(); });
+  const bool guided = tracked != steppers_.end();
   const std::string last = report.failure == StepFailure::work_exceeded ? "" : "; at last " + report.message;
   report.failure = StepFailure::work_exceeded;
   report.message =
-      "cloth '" + (guided ? *tracked : model_.cloths[0])->name + (model_.cloths.size() > 1 ? "' and others" : "'") +
+      "cloth '" + (guided ? *tracked : steppers_[0]).model().name + (steppers_.size() > 1 ? "' and others" : "'") +
       ": contact needs more work than a step is given, at " + milliseconds(h) + ": use a shorter step, or " +
       (guided ? "a guide that moves by less at once, does not crumple, and is clear of obstacles"
               : "move what holds it and obstacles by less at once, and leave it more room") +
@@ -52,9 +52,9 @@ void ClothGroup::blameWork(double h, StepReport& report) const
 /// Collisions move averages that are prescribed. Going back and forth between both leads to where both are met, by a
 /// factor of about a thousand each time where what touches is little of what an average is taken over; where a cloth is
 /// pressed flat a hundred rounds were seen. Collisions have the last word.
-CollisionReport ClothGroup::resolve(const CollisionStep& step)
+CollisionReport ImpulseCloths::resolve(const CollisionStep& step)
 {
-  held_impulses_.setZero(3, first_.back());
+  held_impulses_.setZero(3, vertices());
   CollisionReport report = resolveContacts(step);
   double earlier = std::numeric_limits<double>::infinity();
   for (int round = 1; report.ok && round <= kMeetRounds; ++round)
@@ -79,7 +79,7 @@ CollisionReport ClothGroup::resolve(const CollisionStep& step)
   return report;
 }
 
-void ClothGroup::prepareCorrection(std::size_t k)
+void ImpulseCloths::prepareCorrection(std::size_t k)
 {
   AverageCorrection& to = corrections_[k];
   if (to.ready && to.pins == work_.cloths[k].pins && to.set == work_.cloths[k].average_set)
@@ -97,7 +97,7 @@ void ClothGroup::prepareCorrection(std::size_t k)
 /// What push_ does on the masses of a cloth against averages that are met: these balance that part, so that no motion
 /// answers it. Pushes that they balance wholly, of a flat sheet that comes down on a floor, would have the rounding
 /// errors that are left as their answer.
-double ClothGroup::balancedWork(std::size_t k, double h)
+double ImpulseCloths::balancedWork(std::size_t k, double h)
 {
   constexpr int kSweeps = 100;
   prepareCorrection(k);
@@ -132,12 +132,12 @@ double ClothGroup::balancedWork(std::size_t k, double h)
 /// Makes the multipliers of a cloth's averages those that bounds of their forces allow: block Gauss-Seidel over
 /// averages, each force projected into its ball. Forces so far are those of the cloth's own step and of what contacts
 /// have changed since. Returns the largest change that is needed, as meetAverages() counts it.
-double ClothGroup::boundAverages(std::size_t k, double h, double gap)
+double ImpulseCloths::boundAverages(std::size_t k, double h, double gap)
 {
   constexpr int kSweeps = 2000;
   AverageCorrection& to = corrections_[k];
   // of a force's direction, by the cloth's own step
-  const double unresolved = 2.0 * model_.options[k].linear_tolerance;
+  const double unresolved = 2.0 * cloth(k).options.linear_tolerance;
   const Eigen::VectorXd& bounds = averagesOf(k)->bounds;
   std::vector<int>& at_bound = next_.cloths[k].at_bound;
   at_bound.clear();
@@ -178,10 +178,10 @@ double ClothGroup::boundAverages(std::size_t k, double h, double gap)
 
 /// Moves what is free, by as little as its mass allows. Returns the largest error of an average that there was, in
 /// units of what is tolerated; nothing moves when that is at most 1.
-double ClothGroup::meetAverages(double h)
+double ImpulseCloths::meetAverages(double h)
 {
   double worst = 0.0;
-  for (std::size_t k = 0; k < model_.cloths.size(); ++k)
+  for (std::size_t k = 0; k < steppers_.size(); ++k)
   {
     if (!averagesOf(k))
       continue;
@@ -190,7 +190,7 @@ double ClothGroup::meetAverages(double h)
     AverageCorrection& to = corrections_[k];
     const int first = first_[k], count = first_[k + 1] - first;
     const auto x = x_.middleCols(first, count);
-    to.gap = sub_.cloths[k].averages;
+    to.gap = sub_inputs_[k].averages;
     for (Eigen::Index i = 0; i < c.rows(); ++i)
       for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
         to.gap.col(i) -= entry.value() * x.col(entry.col());

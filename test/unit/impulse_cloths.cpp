@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/cloth/cloth_group.h"
 #include "slender_sim/geometry/mesh_shapes.h"
+#include "test/support/groups.h"
 
 namespace slender::test {
 namespace {
@@ -11,158 +11,150 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-struct Cloths
+struct Cloths : Group
 {
-  ClothGroupModel model;
-  ClothGroupState state;
-  ClothGroupInputs inputs;
-
-  void add(const std::string& name, int n, double size, const Vector3d& corner, double friction = 0.3)
+  void add(const std::string& name, int n, double size, const Vector3d& corner, const ClothOptions& options = {})
   {
     ClothModel cloth =
         buildCloth(name, gridMesh(size, size, n, n, GridPattern::alternating), 0.2, isotropicMembrane(1e6, 0.3, 5e-4));
     cloth.bending_modulus = 1e-6;
     cloth.stiffness_damping = 1e-3;
-    model.cloths.push_back(std::make_shared<ClothModel>(cloth));
-    ContactProperties contact;
-    contact.thickness = 4e-3;
-    contact.friction = friction;
-    model.contact.push_back(contact);
-    state.cloths.push_back(makeClothState(cloth, cloth.rest.vertices.colwise() + corner));
-    inputs.cloths.emplace_back();
+    addCloth(std::make_shared<ClothModel>(cloth), makeClothState(cloth, cloth.rest.vertices.colwise() + corner),
+             options, impulseContact(4e-3));
   }
-  void addSolid(const Shape& shape, const Pose& pose = {})
-  {
-    model.solids.push_back({shape, -1.0, {}});
-    state.solids.push_back(pose);
-    inputs.solids.push_back(pose);
-  }
+  const ClothModel& cloth(int k) const { return *model.cloths[static_cast<std::size_t>(k)].model; }
 };
 
-TEST(ClothGroup, ContactForcesBalanceMomentum)
+TEST(ImpulseCloths, ContactForcesBalanceMomentum)
 {
   // two cloths that fall onto a ball and onto each other, one of them held: the forces of every step are its change of
   // momentum
   Cloths c;
-  c.add("upper", 6, 0.3, {-0.15, -0.15, 0.112});
-  c.add("lower", 6, 0.3, {-0.14, -0.15, 0.106});
-  c.addSolid(Sphere{0.1});
-  pinVertices(c.state.cloths[0], {0});
-  c.inputs.cloths[0].pins = c.state.cloths[0].x.col(0);
   ClothOptions options;
   options.linear_tolerance = 1e-8;
-  ClothGroup group(c.model, options);
+  c.add("upper", 6, 0.3, {-0.15, -0.15, 0.112}, options);
+  c.add("lower", 6, 0.3, {-0.14, -0.15, 0.106}, options);
+  c.addObstacle(Sphere{0.1}, {});
+  pinVertices(c.state.cloths[0], {0});
+  c.inputs.cloths[0].pins = c.state.cloths[0].x.col(0);
+  World world = c.world({}, 0.005);
   double most = 0.0, supported = 0.0;
+  int repulsions = 0;
   for (int k = 0; k < 60; ++k)
   {
-    const ClothGroupState before = c.state;
-    ASSERT_TRUE(group.step(c.state, c.inputs, 0.005).ok);
+    const WorldState before = c.state;
+    const StepReport report = world.step(c.state, c.inputs);
+    ASSERT_TRUE(report.ok);
+    repulsions = report.repulsions;
     for (int i = 0; i < 2; ++i)
     {
-      const ClothModel& model = *c.model.cloths[static_cast<std::size_t>(i)];
+      const ClothModel& model = c.cloth(i);
       const auto& x = c.state.cloths[static_cast<std::size_t>(i)];
-      Vector3d forces = -group.pinForces(i).rowwise().sum(), change(0, 0, 0);
+      const Matrix3Xd contact = world.clothContactForces(i);
+      Vector3d forces = -world.pinForces(i).rowwise().sum(), change(0, 0, 0);
       for (int v = 0; v < model.vertices(); ++v)
       {
         change += model.mass[v] / 0.005 * (x.v.col(v) - before.cloths[static_cast<std::size_t>(i)].v.col(v));
-        forces += model.mass[v] * c.inputs.cloths[static_cast<std::size_t>(i)].gravity + group.contactForces(i).col(v);
-        most = std::max(most, group.contactForces(i).col(v).norm());
-        supported += group.contactForces(i)(2, v) / 60;
+        forces += model.mass[v] * c.inputs.cloths[static_cast<std::size_t>(i)].gravity + contact.col(v);
+        most = std::max(most, contact.col(v).norm());
+        supported += contact(2, v) / 60;
       }
       // answers to contacts are solved to that
       EXPECT_LT((change - forces).norm(), 1e-3 * model.totalMass() * 9.81) << k << " " << i;
     }
   }
-  EXPECT_GT(group.collisions().repulsions, 0);
+  EXPECT_GT(repulsions, 0);
   EXPECT_GT(most, 0.01);
-  EXPECT_GT(supported, 0.3 * 2 * c.model.cloths[0]->totalMass() * 9.81);
+  EXPECT_GT(supported, 0.3 * 2 * c.cloth(0).totalMass() * 9.81);
 }
 
-TEST(ClothGroup, ComesToRestOnAFloor)
+TEST(ImpulseCloths, ComesToRestOnAFloor)
 {
   Cloths c;
   c.add("upper", 6, 0.3, {0, 0, 0.012});
   c.add("lower", 6, 0.3, {0.02, 0.01, 0.006});
-  c.addSolid(Plane{});
-  ClothGroup group(c.model, {});
-  group.checkIntersections(c.state);
+  c.addObstacle(Plane{}, {});
+  World world = c.world({}, 0.005);
+  world.checkCloths(c.state);
   double speed = 0.0;
+  int repulsions = 0;
   for (int k = 0; k < 200; ++k)
   {
-    const StepReport report = group.step(c.state, c.inputs, 0.005);
+    const StepReport report = world.step(c.state, c.inputs);
     ASSERT_TRUE(report.ok) << report.message;
-    ASSERT_EQ(group.intersections(c.state), 0u) << k;
+    ASSERT_NO_THROW(world.checkCloths(c.state)) << k;
+    repulsions = report.repulsions;
     speed = std::max(c.state.cloths[0].v.cwiseAbs().maxCoeff(), c.state.cloths[1].v.cwiseAbs().maxCoeff());
   }
-  EXPECT_GT(group.collisions().repulsions, 0);
+  EXPECT_GT(repulsions, 0);
   EXPECT_LT(speed, 5e-3);
   // half a thickness above the floor, a thickness apart
   EXPECT_NEAR(c.state.cloths[1].x.row(2).mean(), 2e-3, 4e-4);
   EXPECT_NEAR(c.state.cloths[0].x.row(2).mean(), 6e-3, 1e-3);
 }
 
-TEST(ClothGroup, AFastSolidIsStoppedByNothingButCarriesCloth)
+TEST(ImpulseCloths, AFastSolidIsStoppedByNothingButCarriesCloth)
 {
   Cloths c;
   c.add("cloth", 8, 0.4, {-0.2, -0.2, 0});
-  c.addSolid(Sphere{0.05}, {{0, 0, -0.1}, Quaterniond::Identity()});
+  c.addObstacle(Sphere{0.05}, {{0, 0, -0.1}, Quaterniond::Identity()});
   for (ClothInputs& in : c.inputs.cloths)
     in.gravity.setZero();
-  ClothGroup group(c.model, {});
+  World world = c.world({}, 0.005);
   for (int k = 0; k < 10; ++k)   // at 20 m/s
   {
-    c.inputs.solids[0].position.z() += 0.1;
-    const StepReport report = group.step(c.state, c.inputs, 0.005);
+    c.inputs.obstacles[0].X_WG.position.z() += 0.1;
+    const StepReport report = world.step(c.state, c.inputs);
     ASSERT_TRUE(report.ok) << report.message;
-    ASSERT_EQ(group.intersections(c.state), 0u);
-    ASSERT_EQ(c.state.solids[0].position, c.inputs.solids[0].position);
+    ASSERT_NO_THROW(world.checkCloths(c.state));
+    ASSERT_EQ(c.state.obstacles[0].position, c.inputs.obstacles[0].X_WG.position);
   }
   double top = -1e9;
   for (int i = 0; i < c.state.cloths[0].x.cols(); ++i)
     top = std::max(top, c.state.cloths[0].x(2, i));
-  EXPECT_GT(top, c.state.solids[0].position.z() + 0.05);
+  EXPECT_GT(top, c.state.obstacles[0].position.z() + 0.05);
 }
 
-TEST(ClothGroup, SqueezedClothIsRefusedAndTheStateKept)
+TEST(ImpulseCloths, SqueezedClothIsRefusedAndTheStateKept)
 {
   Cloths c;
   c.add("cloth", 4, 0.1, {-0.05, -0.05, 0});
-  c.addSolid(Box{{0.2, 0.2, 0.02}}, {{0, 0, 0.02}, Quaterniond::Identity()});
-  c.addSolid(Box{{0.2, 0.2, 0.02}}, {{0, 0, -0.02}, Quaterniond::Identity()});
-  ClothGroup group(c.model, {});
-  c.inputs.solids[0].position.z() = 0.009;
-  c.inputs.solids[1].position.z() = -0.009;
-  const ClothGroupState before = c.state;
-  const StepReport report = group.step(c.state, c.inputs, 0.01);
+  c.addObstacle(Box{{0.2, 0.2, 0.02}}, {{0, 0, 0.02}, Quaterniond::Identity()});
+  c.addObstacle(Box{{0.2, 0.2, 0.02}}, {{0, 0, -0.02}, Quaterniond::Identity()});
+  World world = c.world({}, 0.01);
+  c.inputs.obstacles[0].X_WG.position.z() = 0.009;
+  c.inputs.obstacles[1].X_WG.position.z() = -0.009;
+  const WorldState before = c.state;
+  const StepReport report = world.step(c.state, c.inputs);
   EXPECT_FALSE(report.ok);
   EXPECT_EQ(report.failure, StepFailure::squeezed);
   EXPECT_NE(report.message.find("prescribed"), std::string::npos) << report.message;
   EXPECT_GT(report.cut_steps, 0);
   EXPECT_EQ(c.state.cloths[0].x, before.cloths[0].x);
   EXPECT_EQ(c.state.cloths[0].v, before.cloths[0].v);
-  EXPECT_EQ(c.state.solids[0].position, before.solids[0].position);
+  EXPECT_EQ(c.state.obstacles[0].position, before.obstacles[0].position);
 }
 
 /// What one step cannot do, because a solid turns by more than a quarter, shorter ones can.
-TEST(ClothGroup, HalvesStepsWhereNeeded)
+TEST(ImpulseCloths, HalvesStepsWhereNeeded)
 {
   Cloths c;
   c.add("cloth", 6, 0.2, {-0.1, -0.1, 0.003});
-  c.addSolid(Box{{0.5, 0.5, 0.1}}, {{0, 0, -0.05}, Quaterniond::Identity()});
-  ClothGroup group(c.model, {});
+  c.addObstacle(Box{{0.5, 0.5, 0.1}}, {{0, 0, -0.05}, Quaterniond::Identity()});
+  World world = c.world({}, 0.01);
   for (int k = 0; k < 5; ++k)
-    ASSERT_TRUE(group.step(c.state, c.inputs, 0.01).ok);
-  c.inputs.solids[0].orientation = Quaterniond(Eigen::AngleAxisd(2.5, Vector3d::UnitZ()));
-  c.inputs.solids[0].position.z() += 0.02;
-  const StepReport report = group.step(c.state, c.inputs, 0.01);
+    ASSERT_TRUE(world.step(c.state, c.inputs).ok);
+  c.inputs.obstacles[0].X_WG.orientation = Quaterniond(Eigen::AngleAxisd(2.5, Vector3d::UnitZ()));
+  c.inputs.obstacles[0].X_WG.position.z() += 0.02;
+  const StepReport report = world.step(c.state, c.inputs);
   ASSERT_TRUE(report.ok) << report.message;
-  EXPECT_EQ(group.intersections(c.state), 0u);
+  EXPECT_NO_THROW(world.checkCloths(c.state));
   EXPECT_GT(c.state.cloths[0].x.row(2).minCoeff(), 0.02);
 }
 
 /// Whatever solves them: a load shared by the inertia of an integrator's stage would be worth something else in each
 /// cloth.
-TEST(ClothGroup, ContactKeepsMomentumAcrossIntegrators)
+TEST(ImpulseCloths, ContactKeepsMomentumAcrossIntegrators)
 {
   ClothOptions euler, second, controlled;
   second.integrator = controlled.integrator = Integrator::tr_bdf2;
@@ -170,26 +162,25 @@ TEST(ClothGroup, ContactKeepsMomentumAcrossIntegrators)
   for (const auto& options : {std::vector<ClothOptions>{euler, second}, {controlled, euler}, {second, controlled}})
   {
     Cloths c;
-    c.add("lower", 8, 0.3, {0, 0, 0});
-    c.add("upper", 8, 0.3, {0.1, 0.07, 0.02});
-    c.model.options = options;
+    c.add("lower", 8, 0.3, {0, 0, 0}, options[0]);
+    c.add("upper", 8, 0.3, {0.1, 0.07, 0.02}, options[1]);
     for (int k = 0; k < 2; ++k)
     {
       c.inputs.cloths[k].gravity.setZero();
       c.state.cloths[k].v.row(2).setConstant(k == 0 ? 1.0 : -1.0);
     }
-    ClothGroup group(c.model, {});
+    World world = c.world({}, 2e-3);
     const auto momentum = [&]() -> Vector3d {
-      return c.state.cloths[0].v * c.model.cloths[0]->mass + c.state.cloths[1].v * c.model.cloths[1]->mass;
+      return c.state.cloths[0].v * c.cloth(0).mass + c.state.cloths[1].v * c.cloth(1).mass;
     };
     const Vector3d before = momentum();
     for (int k = 0; k < 20; ++k)
     {
-      const StepReport report = group.step(c.state, c.inputs, 2e-3);
+      const StepReport report = world.step(c.state, c.inputs);
       ASSERT_TRUE(report.ok) << report.message;
     }
     // of 1 m/s; what the linear solver leaves
-    EXPECT_LT((momentum() - before).norm(), 1e-3 * c.model.cloths[0]->totalMass());
+    EXPECT_LT((momentum() - before).norm(), 1e-3 * c.cloth(0).totalMass());
     EXPECT_LT(std::abs(c.state.cloths[0].v.row(2).mean()), 0.5);   // they have met
   }
 }
@@ -198,29 +189,31 @@ TEST(ClothGroup, ContactKeepsMomentumAcrossIntegrators)
 double largestGain(Integrator integrator, bool one_newton_step, double error_tolerance)
 {
   Cloths c;
-  c.add("cloth", 12, 0.3, {-0.15, -0.15, 0.053});
-  c.addSolid(Sphere{0.05});
   ClothOptions options;
   options.integrator = integrator;
   options.one_newton_step = one_newton_step;
   options.error_tolerance = error_tolerance;
-  ClothGroup group(c.model, options);
-  const auto energy = [&] { return group.stepper(0).energies(c.state.cloths[0], c.inputs.cloths[0].gravity).total(); };
+  c.add("cloth", 12, 0.3, {-0.15, -0.15, 0.053}, options);
+  c.addObstacle(Sphere{0.05}, {});
+  World world = c.world({}, 0.005);
+  const auto energy = [&] { return world.clothEnergies(0, c.state.cloths[0], c.inputs.cloths[0].gravity).total(); };
   double largest = 0.0;
+  int repulsions = 0;
   for (int k = 0; k < 30; ++k)   // until its own folds meet
   {
     const double before = energy();
-    const StepReport report = group.step(c.state, c.inputs, 0.005);
+    const StepReport report = world.step(c.state, c.inputs);
     EXPECT_TRUE(report.ok) << report.message;
+    repulsions = report.repulsions;
     largest = std::max(largest, energy() - before);
   }
-  EXPECT_GT(group.collisions().repulsions, 0);
-  return largest / (c.model.cloths[0]->totalMass() * 9.81 * 0.05);
+  EXPECT_GT(repulsions, 0);
+  return largest / (c.cloth(0).totalMass() * 9.81 * 0.05);
 }
 
 /// Contact holds stiff cloth away from its balance, which steps by tr_bdf2 would answer with five times the speed that
 /// takes it back.
-TEST(ClothGroup, ContactAddsNoEnergyToStepsOfSecondOrder)
+TEST(ImpulseCloths, ContactAddsNoEnergyToStepsOfSecondOrder)
 {
   for (const bool one_newton_step : {false, true})
     // tr_bdf2 throughout: 0.2 to 0.3
@@ -228,7 +221,7 @@ TEST(ClothGroup, ContactAddsNoEnergyToStepsOfSecondOrder)
 }
 
 /// Parts of a step would let go with as many times that speed: no more than the same steps undivided.
-TEST(ClothGroup, ContactAddsNoEnergyToControlledSteps)
+TEST(ImpulseCloths, ContactAddsNoEnergyToControlledSteps)
 {
   for (const bool one_newton_step : {false, true})
   {
@@ -242,54 +235,51 @@ TEST(ClothGroup, ContactAddsNoEnergyToControlledSteps)
   }
 }
 
-TEST(ClothGroup, RefusesIntersectionsAtTheStart)
+TEST(ImpulseCloths, RefusesIntersectionsAtTheStart)
 {
   Cloths c;
   c.add("first", 4, 0.2, {0, 0, 0});
   c.add("second", 4, 0.2, {0.05, 0.05, 0.01});
-  c.addSolid(Sphere{0.05}, {{0, 0, 1}, Quaterniond::Identity()});
-  ClothGroup group(c.model, {});
-  EXPECT_NO_THROW(group.checkIntersections(c.state));
+  c.addObstacle(Sphere{0.05}, {{0, 0, 1}, Quaterniond::Identity()});
+  World world = c.world({}, 0.01);
+  EXPECT_NO_THROW(world.checkCloths(c.state));
   for (int i = 0; i < 25; ++i)
     c.state.cloths[1].x(2, i) = c.state.cloths[1].x(0, i) - 0.1;
   try
   {
-    group.checkIntersections(c.state);
+    world.checkCloths(c.state);
     ADD_FAILURE();
   }
   catch (const std::invalid_argument& e)
   {
     EXPECT_NE(std::string(e.what()).find("' at vertex "), std::string::npos) << e.what();
   }
-  c.model.contact.pop_back();
-  EXPECT_THROW(ClothGroup(c.model, {}), std::invalid_argument);
-  EXPECT_THROW(group.step(c.state, ClothGroupInputs(), 0.01), std::invalid_argument);
 }
 
 /// Shorter steps would not help.
-TEST(ClothGroup, WhatMeetsAtTheStartIsRefusedAtOnce)
+TEST(ImpulseCloths, WhatMeetsAtTheStartIsRefusedAtOnce)
 {
   Cloths c;
   c.add("cloth", 4, 0.2, {-0.1, -0.1, 0.01});
-  c.addSolid(Plane{});
-  ClothGroup group(c.model, {});
+  c.addObstacle(Plane{}, {});
+  World world = c.world({}, 0.005);
   c.state.cloths[0].x(2, 3) = -0.01;
-  const StepReport report = group.step(c.state, c.inputs, 0.005);
+  const StepReport report = world.step(c.state, c.inputs);
   EXPECT_FALSE(report.ok);
   EXPECT_EQ(report.cut_steps, 0);
   EXPECT_EQ(report.message.find("shorter step"), std::string::npos) << report.message;
 }
 
-TEST(ClothGroup, LayersMuchThickerThanEdgesAreRefused)
+TEST(ImpulseCloths, LayersMuchThickerThanEdgesAreRefused)
 {
   Cloths c;
   c.add("quilt", 20, 0.1, {0, 0, 0});   // edges of 5 mm, and diagonals
-  c.model.contact[0].thickness = 0.019;
-  EXPECT_NO_THROW(ClothGroup(c.model, {}));
-  c.model.contact[0].thickness = 0.025;
+  c.model.cloths[0].contact->thickness = 0.019;
+  EXPECT_NO_THROW(c.world({}, 0.005));
+  c.model.cloths[0].contact->thickness = 0.025;
   try
   {
-    ClothGroup group(c.model, {});
+    World world = c.world({}, 0.005);
     ADD_FAILURE();
   }
   catch (const std::invalid_argument& e)
@@ -300,21 +290,20 @@ TEST(ClothGroup, LayersMuchThickerThanEdgesAreRefused)
 }
 
 /// Not as if something had squeezed them.
-TEST(ClothGroup, ExplicitStepsThatAreTooLongAreSaidToBe)
+TEST(ImpulseCloths, ExplicitStepsThatAreTooLongAreSaidToBe)
 {
   for (const Integrator integrator : {Integrator::imex, Integrator::symplectic_euler})
   {
     Cloths c;
-    c.add("cloth", 8, 0.2, {-0.1, -0.1, 0.053});
-    c.addSolid(Sphere{0.05});
     ClothOptions options;
     options.integrator = integrator;
     options.newton.max_cuts = 2;
-    ClothGroup group(c.model, options);
-    const double stable = group.stepper(0).stableStep();
+    c.add("cloth", 8, 0.2, {-0.1, -0.1, 0.053}, options);
+    c.addObstacle(Sphere{0.05}, {});
+    World world = c.world({}, 8.0 * ClothStepper(c.model.cloths[0].model, options).stableStep());
     StepReport report;
     for (int k = 0; k < 200 && report.ok; ++k)
-      report = group.step(c.state, c.inputs, 8.0 * stable);
+      report = world.step(c.state, c.inputs);
     ASSERT_FALSE(report.ok);
     EXPECT_EQ(report.failure, StepFailure::state_not_finite);
     EXPECT_NE(report.message.find("too long for its membrane"), std::string::npos) << report.message;
@@ -322,7 +311,7 @@ TEST(ClothGroup, ExplicitStepsThatAreTooLongAreSaidToBe)
 }
 
 /// The estimate is the limit: oscillations of the cloth at rest grow beyond it and stay below.
-TEST(ClothGroup, StableStepIsTheLimitOfExplicitSteps)
+TEST(ImpulseCloths, StableStepIsTheLimitOfExplicitSteps)
 {
   Cloths c;
   c.add("cloth", 8, 0.2, {0, 0, 0});
@@ -330,7 +319,7 @@ TEST(ClothGroup, StableStepIsTheLimitOfExplicitSteps)
   {
     ClothOptions options;
     options.integrator = integrator;
-    ClothStepper stepper(c.model.cloths[0], options);
+    ClothStepper stepper(c.model.cloths[0].model, options);
     const auto speedAfter = [&](double share) {
       ClothState state = c.state.cloths[0];
       for (Eigen::Index i = 0; i < state.x.cols(); ++i)
@@ -345,17 +334,17 @@ TEST(ClothGroup, StableStepIsTheLimitOfExplicitSteps)
     EXPECT_LT(speedAfter(0.95), 1e-5);
     EXPECT_GT(speedAfter(1.1), 1e-3);
   }
-  EXPECT_TRUE(std::isinf(ClothStepper(c.model.cloths[0], {}).stableStep()));
+  EXPECT_TRUE(std::isinf(ClothStepper(c.model.cloths[0].model, {}).stableStep()));
 }
 
 /// An explicit cloth beside it answers with its masses, the other as ever.
-TEST(ClothGroup, AnExplicitClothLeavesLoadsOfOthersShared)
+TEST(ImpulseCloths, AnExplicitClothLeavesLoadsOfOthersShared)
 {
   Cloths c;
   c.add("cloth", 4, 0.1, {0, 0, 0});
   ClothOptions options;
   options.integrator = Integrator::symplectic_euler;
-  ClothStepper stepper(c.model.cloths[0], options);
+  ClothStepper stepper(c.model.cloths[0].model, options);
   ClothState state = c.state.cloths[0];
   pinVertices(state, {3});
   ClothInputs inputs;
@@ -365,18 +354,18 @@ TEST(ClothGroup, AnExplicitClothLeavesLoadsOfOthersShared)
   const Eigen::Matrix3Xd force = Eigen::Matrix3Xd::Constant(3, state.x.cols(), 2.0);
   Eigen::Matrix3Xd moved(3, state.x.cols()), pins, averages;
   ASSERT_TRUE(stepper.respond(force, h, moved, pins, averages));
-  EXPECT_NEAR(moved(1, 5), 2.0 * h * h / c.model.cloths[0]->mass[5], 1e-15);
+  EXPECT_NEAR(moved(1, 5), 2.0 * h * h / c.cloth(0).mass[5], 1e-15);
   EXPECT_EQ(moved.col(3), Vector3d(0, 0, 0));
 }
 
 /// A step length from a state file that is far below min_step.
-TEST(ClothGroup, ErrorControlDoesNotStartBelowItsShortestStep)
+TEST(ImpulseCloths, ErrorControlDoesNotStartBelowItsShortestStep)
 {
   Cloths c;
   c.add("cloth", 4, 0.1, {0, 0, 0});
   ClothOptions options;
   options.error_tolerance = 1e-4;
-  ClothStepper stepper(c.model.cloths[0], options);
+  ClothStepper stepper(c.model.cloths[0].model, options);
   c.state.cloths[0].next_step = 1e-300;
   const StepReport report = stepper.step(c.state.cloths[0], c.inputs.cloths[0], 0.005);
   EXPECT_TRUE(report.ok) << report.message;
