@@ -115,6 +115,7 @@ TEST(ClothReader, NamesWhatIsWrong)
       {"cloths.0.damping.drag=-1", "cloths.0.damping.drag = -1"},
       {"cloths.0.solver.linear=gauss", "cloths.0.solver.linear = gauss"},
       {"cloths.0.solver.tolerance=1", "must be a number in (0, 1)"},
+      {"cloths.0.grasps={left-hand: {corner: upper_left}}", "\"left-hand\", which is not a name"},
       {"cloths.0.grasps.left={corner: top}", "cloths.0.grasps.left.corner = top"},
       {"cloths.0.grasps.left={corner: upper_left, edge: upper}", "must have one of vertices"},
       {"cloths.0.grasps.left={vertices: [63]}", "must be a whole number in [-63, 62]"},

@@ -262,6 +262,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
   for (const auto& [name, entry] :
        at.members("A grasp under a name of yours (letters, digits and '_'), which topics and tables use."))
   {
+    entry.checkOwnName(name);
     GraspConfig grasp;
     grasp.name = name;
     YamlMap map(entry);
