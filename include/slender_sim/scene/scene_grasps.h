@@ -60,7 +60,8 @@ private:
   /// Updates the poses of grasps of cloths to their targets, and the wrenches of all grasps. Call it after a step.
   void takeWrenches(const World& world);
 
-  void check(int grasp) const;
+  /// Throws std::invalid_argument if there is no such grasp.
+  const GraspRef& checked(int grasp) const;
   void checkHeld(int rod, int grasp, int first_node, int last_node) const;
   /// Sets the offset from the driving frame: the pose of a table at `time` [s], or the present pose of the followed
   /// body or obstacle.

@@ -30,28 +30,25 @@ SceneGrasps::SceneGrasps(const SceneConfig& config, const WorldModel& model, Sce
 
 bool SceneGrasps::isActive(int grasp) const
 {
-  check(grasp);
-  const GraspRef& ref = refs_[grasp];
+  const GraspRef& ref = checked(grasp);
   return ref.cloth >= 0 ? state_.cloth_grasps[ref.cloth][ref.index].active : held(ref).active;
 }
 
 const Pose& SceneGrasps::pose(int grasp) const
 {
-  check(grasp);
-  const GraspRef& ref = refs_[grasp];
+  const GraspRef& ref = checked(grasp);
   return ref.cloth >= 0 ? state_.cloth_grasps[ref.cloth][ref.index].X_WG : held(ref).X_WG;
 }
 
 const std::string& SceneGrasps::heldObject(int grasp) const
 {
-  check(grasp);
-  const GraspRef& ref = refs_[grasp];
+  const GraspRef& ref = checked(grasp);
   return ref.cloth >= 0 ? config_.cloths[ref.cloth].name : config_.rods[ref.rod].name;
 }
 
 const Wrench& SceneGrasps::wrench(int grasp) const
 {
-  check(grasp);
+  checked(grasp);
   return state_.wrenches[grasp];
 }
 
@@ -77,7 +74,7 @@ void SceneGrasps::inputsAt(double time, SceneInputs& inputs) const
 
 GraspTarget SceneGrasps::targetOf(int grasp, const Pose& X_WM, const std::optional<Twist>& velocity) const
 {
-  check(grasp);
+  checked(grasp);
   const Pose& offset = state_.grasp_offsets[grasp];
   if (isIdentity(offset))
     return {X_WM, velocity};   // not multiplied by an identity, which would round
@@ -89,7 +86,7 @@ GraspTarget SceneGrasps::targetOf(int grasp, const Pose& X_WM, const std::option
 
 void SceneGrasps::setOffset(int grasp, const Pose& X_WM)
 {
-  check(grasp);
+  checked(grasp);
   state_.grasp_offsets[grasp] = X_WM.inverse() * pose(grasp);
 }
 
@@ -168,19 +165,19 @@ void SceneGrasps::takeWrenches(const World& world)
   }
 }
 
-void SceneGrasps::check(int grasp) const
+const GraspRef& SceneGrasps::checked(int grasp) const
 {
   if (grasp < 0 || grasp >= static_cast<int>(refs_.size()))
   {
     throw std::invalid_argument("grasp = " + std::to_string(grasp) + "; must be in [0, " +
                                 std::to_string(refs_.size()) + ")");
   }
+  return refs_[grasp];
 }
 
 void SceneGrasps::attach(int grasp, int first_node, int last_node, Hold hold)
 {
-  check(grasp);
-  const GraspRef& ref = refs_[grasp];
+  const GraspRef& ref = checked(grasp);
   if (ref.cloth >= 0)
   {
     std::vector<int> vertices(static_cast<std::size_t>(std::max(0, last_node - first_node + 1)));
@@ -219,8 +216,7 @@ void SceneGrasps::attach(int grasp, int first_node, int last_node, Hold hold)
 
 void SceneGrasps::attachVertices(int grasp, std::vector<int> vertices)
 {
-  check(grasp);
-  const GraspRef& ref = refs_[grasp];
+  const GraspRef& ref = checked(grasp);
   if (ref.cloth < 0)
     throw std::invalid_argument("grasp " + ref.config->name + " holds a rod, which has nodes");
   std::sort(vertices.begin(), vertices.end());
@@ -235,8 +231,7 @@ void SceneGrasps::attachVertices(int grasp, std::vector<int> vertices)
 
 void SceneGrasps::release(int grasp)
 {
-  check(grasp);
-  const GraspRef& ref = refs_[grasp];
+  const GraspRef& ref = checked(grasp);
   if (ref.cloth >= 0)
   {
     std::vector<ClothGrasp>& grasps = state_.cloth_grasps[ref.cloth];
