@@ -289,6 +289,8 @@ struct BodyConfig : BodyProperties
   bool broadcast_tf = false;        ///< nodes publish the frame of the body on tf
   std::vector<WeldConfig> welds;
 
+  bool isSolid() const { return shape && contact; }   ///< others may touch it
+  bool isSimulatedSolid() const { return isSolid() && !motion; }
   bool isWeldedTo(int rod) const
   {
     return std::any_of(welds.begin(), welds.end(), [rod](const WeldConfig& weld) { return weld.rod == rod; });

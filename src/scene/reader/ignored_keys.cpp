@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <variant>
@@ -70,12 +71,12 @@ void warnOfWind(const YamlCursor& wind, const SceneConfig& scene)
          "...} or damping: {drag: ...}, of which the scene has none; give the drag");
 }
 
-bool isSimulatedSolid(const BodyConfig& body) { return body.contact && body.shape && !body.motion; }
+const auto is_simulated_solid = std::mem_fn(&BodyConfig::isSimulatedSolid);
 
 /// An obstacle that nothing touches is of use only as the frame that grasps follow.
 void warnOfObstacles(const YamlCursor& obstacles, const SceneConfig& scene)
 {
-  if (anyObject(scene, touches_solids) || any(scene.bodies, isSimulatedSolid))
+  if (anyObject(scene, touches_solids) || any(scene.bodies, is_simulated_solid))
     return;
   const auto follows = [&scene](const std::string& name) {
     const auto by_grasp = [&name](const GraspConfig& grasp) {
@@ -135,7 +136,7 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
     others.push_back("rods");
   if (any(scene.threads, has_contact))
     others.push_back("threads");
-  if (any(scene.bodies, isSimulatedSolid))
+  if (any(scene.bodies, is_simulated_solid))
     others.push_back("simulated bodies");
   if (any(scene.cloths, barrier))
     others.push_back("cloths with contact: {method: barrier}");
@@ -145,7 +146,7 @@ void warnOfKindsThatDoNotMeet(const YamlCursor& cloths, const SceneConfig& scene
              " of this scene: such contact is with cloth of this kind, obstacles, and bodies with a given motion");
 }
 
-bool slips(const BodyConfig& body) { return isSimulatedSolid(body) && body.friction.value_or(1.0) > 0; }
+bool slips(const BodyConfig& body) { return body.isSimulatedSolid() && body.friction.value_or(1.0) > 0; }
 
 /// Returns why the friction of a solid has no effect, or an empty text.
 std::string whyNoFriction(const SceneConfig& scene)
@@ -153,7 +154,7 @@ std::string whyNoFriction(const SceneConfig& scene)
   const auto slips_on_solids = [](const auto& object) {
     return touches_solids(object) && object.contact->friction > 0;
   };
-  if (!anyObject(scene, touches_solids) && !any(scene.bodies, isSimulatedSolid))
+  if (!anyObject(scene, touches_solids) && !any(scene.bodies, is_simulated_solid))
     return "nothing touches it; give the rods, threads or cloths a contact with obstacles, or leave friction out";
   if (!anyObject(scene, slips_on_solids) && !any(scene.bodies, slips))
   {
@@ -201,7 +202,7 @@ void warnOfRod(const YamlCursor& rod, const SceneConfig& scene)
 /// `others`: whether there are obstacles or other bodies with a shape.
 void warnOfBodyShape(const YamlCursor& shape, const BodyConfig& config, bool others)
 {
-  warnIf(isSimulatedSolid(config) && std::holds_alternative<Cylinder>(*config.shape) && others, shape,
+  warnIf(config.isSimulatedSolid() && std::holds_alternative<Cylinder>(*config.shape) && others, shape,
          "touches obstacles and other bodies as a prism of " + std::to_string(kSidesOfCylinder) +
              " sides; rods, threads and cloths touch the cylinder itself");
 }

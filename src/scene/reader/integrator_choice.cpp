@@ -99,12 +99,12 @@ bool touchesSomething(const RodConfig& rod) { return rod.contact.has_value(); }
 /// Whether a simulated body has a shape that may hit something.
 bool hitsSomething(const SceneConfig& scene, const BodyConfig& body)
 {
-  return !body.motion && body.shape && body.contact &&
+  return body.isSimulatedSolid() &&
          (!scene.obstacles.empty() ||
           std::any_of(scene.threads.begin(), scene.threads.end(),
                       [](const ThreadConfig& thread) { return thread.contact.has_value(); }) ||
           std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                      [&](const BodyConfig& other) { return &other != &body && other.shape && other.contact; }));
+                      [&](const BodyConfig& other) { return &other != &body && other.isSolid(); }));
 }
 
 /// The integrator of rods and bodies that touch something.

@@ -220,7 +220,7 @@ ContactConfig readContact(const YamlCursor& at, const SceneConfig& scene)
       gap = std::min(gap, 0.5 * cloth.contact->thickness);
   if (!std::isfinite(gap))   // bodies alone
     for (const BodyConfig& body : scene.bodies)
-      if (body.contact && body.shape && !body.motion)
+      if (body.isSimulatedSolid())
         gap = std::min(gap, 5e-3 * boundingRadius(*body.shape));
   const bool any = std::isfinite(gap);
   contact.gap = any ? gap : 0.0;

@@ -134,7 +134,7 @@ void chooseContactMethods(const std::vector<YamlCursor>& cloths, SceneConfig& sc
   for (const ThreadConfig& thread : scene.threads)
     others = others || thread.contact;
   for (const BodyConfig& body : scene.bodies)
-    others = others || (!body.motion && body.shape && body.contact);
+    others = others || body.isSimulatedSolid();
   for (std::size_t k = 0; k < cloths.size(); ++k)
   {
     const ClothConfig& cloth = scene.cloths[k];
@@ -156,8 +156,8 @@ void chooseContactMethods(const std::vector<YamlCursor>& cloths, SceneConfig& sc
 /// Cloth that impulses correct after its step gives way, which nothing that is simulated along with it would notice.
 void checkUnderCloth(const SceneConfig& scene, const std::vector<YamlCursor>& cloths)
 {
-  const auto body = std::find_if(scene.bodies.begin(), scene.bodies.end(),
-                                 [](const BodyConfig& b) { return !b.motion && b.shape && b.contact; });
+  const auto body =
+      std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const BodyConfig& b) { return b.isSimulatedSolid(); });
   for (std::size_t k = 0; body != scene.bodies.end() && k < cloths.size(); ++k)
   {
     const std::optional<ContactProperties>& contact = scene.cloths[k].contact;

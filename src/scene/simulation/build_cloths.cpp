@@ -143,7 +143,7 @@ void checkContact(SceneConfig& scene, const WorldModel& model)
   });
   for (const BodyConfig& body : scene.bodies)
   {
-    if (obstacles && body.shape && body.contact && !body.motion)
+    if (obstacles && body.isSimulatedSolid())
     {
       throw SceneError(placeOf(scene, FailurePlace::Kind::none, -1) + ": body " + body.name +
                        " is simulated, and contact of cloth by impulses does not push bodies; give it a motion or "

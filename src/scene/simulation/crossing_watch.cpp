@@ -31,7 +31,7 @@ CrossingWatch::CrossingWatch(const Simulation& simulation) : simulation_(simulat
   add(Kind::thread, "thread", scene.threads);
   add(Kind::cloth, "cloth", scene.cloths);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    if (const BodyConfig& body = scene.bodies[b]; !body.motion && body.shape && body.contact)
+    if (const BodyConfig& body = scene.bodies[b]; body.isSimulatedSolid())
     {
       with.push_back(static_cast<int>(objects_.size()));
       objects_.push_back({Kind::body, static_cast<int>(b), "body '" + body.name + "'"});
@@ -70,7 +70,7 @@ void CrossingWatch::pairHeld(Kind kind, int index, double reach, const std::vect
   pair.obstacle = -1;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
     if (const BodyConfig& body = scene.bodies[b];
-        body.motion && body.shape && body.contact && !(kind == Kind::rod && body.isWeldedTo(index)))
+        body.motion && body.isSolid() && !(kind == Kind::rod && body.isWeldedTo(index)))
     {
       pair.body = static_cast<int>(b);
       pair.radius = boundingRadius(*body.shape);

@@ -161,7 +161,7 @@ private:
     for (std::size_t b = 0; b < config_.bodies.size(); ++b)
     {
       const BodyConfig& body = config_.bodies[b];
-      if (body.shape && body.contact && touches(body))
+      if (body.isSolid() && touches(body))
         addSolid(*body.shape, state.bodies[b].X_WB * body.X_BS, radius, quoted("body", body.name));
     }
   }
