@@ -9,8 +9,8 @@
 #include <benchmark/benchmark.h>
 #include <fcl/fcl.h>
 
+#include "contact/contact_potential.h"
 #include "slender_sim/contact/broad_phase.h"
-#include "slender_sim/contact/contact_potential.h"
 #include "slender_sim/contact/solids.h"
 #include "slender_sim/geometry/mesh_shapes.h"
 

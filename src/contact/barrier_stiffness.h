@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "slender_sim/contact/barrier.h"
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 
 namespace slender {
 

@@ -4,7 +4,7 @@
 
 #include "sheet_candidates.h"
 #include "slender_sim/contact/ccd.h"
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/contact/solids.h"
 #include "surface_motion.h"
 

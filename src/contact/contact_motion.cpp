@@ -3,14 +3,14 @@
 #include <limits>
 #include <numeric>
 
-#include "contact_potential_impl.h"
+#include "contact_potential.h"
 #include "convex_minimum.h"
 #include "slender_sim/contact/distance.h"
 
 namespace slender {
 
-double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
-                                         const std::vector<Pose>& poses, const std::vector<Pose>& poses_end)
+double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
+                                   const std::vector<Pose>& poses, const std::vector<Pose>& poses_end)
 {
   check(x, poses);
   check(x_end, poses_end);
@@ -23,12 +23,12 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
     constexpr double kOfSheets = 0.4;   // gaps: in a wider margin, triangles find too many of their neighbours
     const SurfaceMotion motion{x, x_end, poses, poses_end};
     const double moved = (x_end - x).colwise().norm().maxCoeff();
-    margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options.gap, 1.0, 20.0) : kOfSheets) * options.gap;
-    if (moved <= kLongest * options.gap)
-      near_.build(surface, sheets_, solids, motion, options.gap, margin_, kTurnMargin);
+    margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
+    if (moved <= kLongest * options_.gap)
+      near_.build(surface_, sheets_, solids_, motion, options_.gap, margin_, kTurnMargin);
     else
     {
-      swept_.build(surface, sheets_, solids, motion, options.gap, 0.0, 0.0);
+      swept_.build(surface_, sheets_, solids_, motion, options_.gap, 0.0, 0.0);
       candidates = &swept_;
     }
   }
@@ -37,10 +37,10 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
   const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
   for (const GridPairs::Pair& pair : candidates->pairs())
   {
-    const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+    const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
     const double scale = scaleOf(a, b);
     limit.thickness = thicknessOf(pair, scale);
-    limit.reach = scale * options.gap;
+    limit.reach = scale * options_.gap;
     share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
   }
   int solid = -1;
@@ -52,43 +52,42 @@ double ContactPotential::Impl::stepLimit(const Eigen::Matrix3Xd& x, const Eigen:
     if (on.solid != solid)
       rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
     solid = on.solid;
-    const ContactSegment& s = surface.segments[on.segment];
+    const ContactSegment& s = surface_.segments[on.segment];
     limit.thickness = thicknessOf(on);
-    limit.reach = rangeOf(s.object, on.solid) * options.gap;
+    limit.reach = rangeOf(s.object, on.solid) * options_.gap;
     share =
-        std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids[on.solid].pieces[on.piece], rigid, limit));
+        std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids_[on.solid].pieces[on.piece], rigid, limit));
   }
   return sheets_.empty() ? share : std::min(share, sheetsLimit(*candidates, x, x_end, poses, poses_end));
 }
 
-double ContactPotential::Impl::thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key,
-                                       double thickness)
+double ContactPotential::thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness)
 {
   const auto at = std::lower_bound(list.begin(), list.end(), Thinned{key, 0.0});
   return at != list.end() && at->key == key ? at->thickness : thickness;
 }
 
-bool ContactPotential::Impl::fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance,
-                                 double thickness, double scale) const
+bool ContactPotential::fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness,
+                           double scale) const
 {
   // Less than the twelfth at which the barrier is made stiffer: a step under load then ends with more room than it
   // began with, and parts that something else than motion brought together come apart again.
-  const double least = scale * options.gap / 20, opened = scale * options.gap / 16;
+  const double least = scale * options_.gap / 20, opened = scale * options_.gap / 16;
   // Never to less than half of the distance between centrelines.
   if (distance - thickness < least)
     list.push_back({key, distance - std::min(opened, 0.5 * distance)});
   return distance - thickness >= least || distance > 1e-3 * thickness;
 }
 
-bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
-  letPass({x, x, poses, poses});   // what presses on held points passes, also when the pieces are new
-  near_.build(surface, sheets_, solids, {x, x, poses, poses}, options.gap, margin_, 0.0);
+  letPass(x, poses, x, poses);   // what presses on held points passes, also when the pieces are new
+  near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, options_.gap, margin_, 0.0);
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
   for (const GridPairs::Pair& pair : near_.pairs())
   {
-    const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+    const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
     const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b));
     const double scale = scaleOf(a, b);
     if (!fit(thin_pairs_, {pair.first, pair.second, 0}, distance, fullThickness(a, b, scale), scale))
@@ -98,10 +97,10 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
   {
     if (passes(on))
       continue;
-    const ContactSegment& s = surface.segments[on.segment];
+    const ContactSegment& s = surface_.segments[on.segment];
     const Pose to_solid = poses[on.solid].inverse();
     const double distance =
-        segmentPieceDistance(solids[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)),
+        segmentPieceDistance(solids_[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)),
                              to_solid * Eigen::Vector3d(x.col(s.b)))
             .distance;
     if (!fit(thin_on_solids_, {on.solid, on.segment, on.piece}, distance, s.radius))
@@ -112,17 +111,17 @@ bool ContactPotential::Impl::thinToFit(const Eigen::Matrix3Xd& x, const std::vec
   return sheets_.empty() || thinSheetsToFit(x, poses);
 }
 
-double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   check(x, poses);
-  double least = options.gap;
-  const int n = static_cast<int>(surface.segments.size());
+  double least = options_.gap;
+  const int n = static_cast<int>(surface_.segments.size());
   boxes_.resize(n);
   order_.resize(n);
   for (int i = 0; i < n; ++i)
   {
-    const ContactSegment& s = surface.segments[i];
-    const double around = s.radius + 0.5 * options.gap;
+    const ContactSegment& s = surface_.segments[i];
+    const double around = s.radius + 0.5 * options_.gap;
     boxes_[i] = {x.col(s.a).cwiseMin(x.col(s.b)).array() - around, x.col(s.a).cwiseMax(x.col(s.b)).array() + around};
   }
   std::iota(order_.begin(), order_.end(), 0);
@@ -130,8 +129,8 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
   for (int p = 0; p < n; ++p)
     for (int q = p + 1; q < n && boxes_[order_[q]].low.x() <= boxes_[order_[p]].high.x(); ++q)
     {
-      const ContactSegment &a = surface.segments[order_[p]], &b = surface.segments[order_[q]];
-      const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
+      const ContactSegment &a = surface_.segments[order_[p]], &b = surface_.segments[order_[q]];
+      const ContactObject &c = surface_.objects[a.object], &d = surface_.objects[b.object];
       const double scale = scaleOf(a, b);
       const bool counts =
           !(a.prescribed() && b.prescribed()) && scale > 0.0 && (a.object == b.object ? c.self : c.others && d.others);
@@ -139,14 +138,14 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
         least = std::min(least,
                          segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - fullThickness(a, b, scale));
     }
-  for (std::size_t k = 0; k < solids.size(); ++k)
+  for (std::size_t k = 0; k < solids_.size(); ++k)
   {
     const Pose to_solid = poses[k].inverse();
-    const ContactSolid& solid = surface.solids[k];
-    const double reach = boundingRadius(solid.shape) + options.gap;
-    for (const ContactSegment& s : surface.segments)
+    const ContactSolid& solid = surface_.solids[k];
+    const double reach = boundingRadius(solid.shape) + options_.gap;
+    for (const ContactSegment& s : surface_.segments)
     {
-      if (!mayTouch(surface, s, solid))
+      if (!mayTouch(surface_, s, solid))
         continue;
       const Eigen::Vector3d from = to_solid * Eigen::Vector3d(x.col(s.a)), to = to_solid * Eigen::Vector3d(x.col(s.b));
       // What is driven does not touch what is driven: a free end remains.
@@ -154,7 +153,7 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
                             e = !solid.body && s.driven != 0 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(to - from);
       if ((a + 0.5 * e).norm() > 0.5 * e.norm() + s.radius + reach)
         continue;
-      for (const ConvexPiece& piece : solids[k].pieces)
+      for (const ConvexPiece& piece : solids_[k].pieces)
       {
         const auto distance = [&](double t) { return pieceDistance(piece, a + t * e).distance - s.radius; };
         if (distance(0.5) < 0.5 * e.norm() + least)
@@ -162,7 +161,7 @@ double ContactPotential::Impl::clearance(const Eigen::Matrix3Xd& x, const std::v
       }
     }
   }
-  return surface.triangles.empty() ? least : sheetClearance(x, poses, least);
+  return surface_.triangles.empty() ? least : sheetClearance(x, poses, least);
 }
 
 }   // namespace slender

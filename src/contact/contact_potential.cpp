@@ -1,12 +1,10 @@
-#include "slender_sim/contact/contact_potential.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <string>
 
-#include "contact_potential_impl.h"
+#include "contact_potential.h"
 #include "slender_sim/contact/distance.h"
 
 namespace slender {
@@ -66,102 +64,103 @@ void checkSurface(const ContactSurface& surface, const ContactOptions& options)
 
 }   // namespace
 
-ContactPotential::Impl::Impl(ContactSurface s, const ContactOptions& o)
-  : surface((checkSurface(s, o), std::move(s))),
-    options(o),
-    barrier(o.gap),
-    stiffness(surface.objects.size()),
+ContactPotential::ContactPotential(ContactSurface s, const ContactOptions& o)
+  : surface_((checkSurface(s, o), std::move(s))),
+    options_(o),
+    barrier_(o.gap),
+    stiffness_(surface_.objects.size()),
     margin_(o.gap)
 {
-  sheets_.build(surface);
-  held_.build(surface);
+  sheets_.build(surface_);
+  held_.build(surface_);
   listSegments();
-  for (BarrierStiffness& own : stiffness)
-    own.set(0.0, {options.least_stiffness, kInfinity});
-  solids.resize(surface.solids.size());
-  for (std::size_t k = 0; k < solids.size(); ++k)
+  for (BarrierStiffness& own : stiffness_)
+    own.set(0.0, {options_.least_stiffness, kInfinity});
+  solids_.resize(surface_.solids.size());
+  for (std::size_t k = 0; k < solids_.size(); ++k)
   {
-    solids[k].reach = boundingRadius(surface.solids[k].shape);
+    solids_[k].reach = boundingRadius(surface_.solids[k].shape);
     std::visit(
         [&](const auto& shape) {
           using T = std::decay_t<decltype(shape)>;
           if constexpr (std::is_same_v<T, std::shared_ptr<const TriangleMesh>>)
           {
             for (Eigen::Index i = 0; i < shape->triangles.cols(); ++i)
-              solids[k].pieces.push_back(Triangle{shape->vertices.col(shape->triangles(0, i)),
-                                                  shape->vertices.col(shape->triangles(1, i)),
-                                                  shape->vertices.col(shape->triangles(2, i))});
-            solids[k].tree.emplace_back(*shape);
+              solids_[k].pieces.push_back(Triangle{shape->vertices.col(shape->triangles(0, i)),
+                                                   shape->vertices.col(shape->triangles(1, i)),
+                                                   shape->vertices.col(shape->triangles(2, i))});
+            solids_[k].tree.emplace_back(*shape);
           }
           else
-            solids[k].pieces.push_back(shape);
+            solids_[k].pieces.push_back(shape);
         },
-        surface.solids[k].shape);
+        surface_.solids[k].shape);
   }
 }
 
-void ContactPotential::Impl::setPieces(const ContactSurface& pieces)
+void ContactPotential::setPieces(const ContactSurface& pieces)
 {
-  surface.points = pieces.points;
-  surface.segments = pieces.segments;
-  surface.triangles = pieces.triangles;
-  surface.objects = pieces.objects;
-  stiffness.resize(surface.objects.size());
-  sheets_.build(surface);
-  held_.build(surface);
+  surface_.points = pieces.points;
+  surface_.segments = pieces.segments;
+  surface_.triangles = pieces.triangles;
+  surface_.objects = pieces.objects;
+  stiffness_.resize(surface_.objects.size());
+  sheets_.build(surface_);
+  held_.build(surface_);
   listSegments();
-  lagged.clear();
-  contacts.clear();
+  lagged_.clear();
+  contacts_.clear();
   near_.clear();
   swept_.clear();
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
 }
 
-void ContactPotential::Impl::listSegments()
+void ContactPotential::listSegments()
 {
-  segment_of_point_.assign(static_cast<std::size_t>(surface.points), -1);
-  for (std::size_t k = surface.segments.size(); k-- > 0;)
-    segment_of_point_[surface.segments[k].b] = static_cast<int>(k);
-  for (std::size_t k = 0; k < surface.segments.size(); ++k)
-    segment_of_point_[surface.segments[k].a] = static_cast<int>(k);
+  segment_of_point_.assign(static_cast<std::size_t>(surface_.points), -1);
+  for (std::size_t k = surface_.segments.size(); k-- > 0;)
+    segment_of_point_[surface_.segments[k].b] = static_cast<int>(k);
+  for (std::size_t k = 0; k < surface_.segments.size(); ++k)
+    segment_of_point_[surface_.segments[k].a] = static_cast<int>(k);
 }
 
-void ContactPotential::Impl::letPass(const SurfaceMotion& motion)
+void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids,
+                               const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
 {
-  check(motion.x, motion.solids);
-  check(motion.x_end, motion.solids_end);
-  held_.update(surface, solids, motion, options.gap);
+  check(x, solids);
+  check(x_end, solids_end);
+  held_.update(surface_, solids_, {x, x_end, solids, solids_end}, options_.gap);
 }
 
-void ContactPotential::Impl::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses) const
+void ContactPotential::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses) const
 {
-  if (x.cols() != surface.points || poses.size() != surface.solids.size())
+  if (x.cols() != surface_.points || poses.size() != surface_.solids.size())
     throw std::invalid_argument("contact: " + std::to_string(x.cols()) + " points and " + std::to_string(poses.size()) +
-                                " poses; needs " + std::to_string(surface.points) + " and " +
-                                std::to_string(surface.solids.size()));
+                                " poses; needs " + std::to_string(surface_.points) + " and " +
+                                std::to_string(surface_.solids.size()));
 }
 
-double ContactPotential::Impl::restart()
+double ContactPotential::restart()
 {
-  terms.clear();
-  rows.clear();
-  contacts.clear();
-  smallest_gap = kInfinity;
-  for (BarrierStiffness& own : stiffness)
+  terms_.clear();
+  rows_.clear();
+  contacts_.clear();
+  smallest_gap_ = kInfinity;
+  for (BarrierStiffness& own : stiffness_)
     own.restart();
   return kInfinity;
 }
 
-double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness,
-                                        const Eigen::VectorXd* turns)
+double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness,
+                                  const Eigen::VectorXd* turns)
 {
   check(x, poses);
   restart();
   if (!x.allFinite())
     return kInfinity;
   if (!near_.holdsFor(x, poses))
-    near_.build(surface, sheets_, solids, {x, x, poses, poses}, options.gap, margin_, kTurnMargin);
+    near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, options_.gap, margin_, kTurnMargin);
   double energy = 0.0;
   for (const GridPairs::Pair& pair : near_.pairs())
   {
@@ -182,11 +181,11 @@ double ContactPotential::Impl::evaluate(const Eigen::Matrix3Xd& x, const std::ve
   return energy + addFriction(x, poses, turns, with_stiffness);
 }
 
-double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness)
+double ContactPotential::addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness)
 {
-  const ContactSegment &a = surface.segments[pair.first], &b = surface.segments[pair.second];
+  const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
   const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
-  const double scale = scaleOf(a, b), thickness = thicknessOf(pair, scale), range = thickness + scale * options.gap;
+  const double scale = scaleOf(a, b), thickness = thicknessOf(pair, scale), range = thickness + scale * options_.gap;
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
   const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
   // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
@@ -208,26 +207,26 @@ double ContactPotential::Impl::addPair(const Eigen::Matrix3Xd& x, const GridPair
   return addContact(x, gap, contact, scale, with_stiffness);
 }
 
-double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,
-                                          const std::vector<Pose>& poses, bool with_stiffness)
+double ContactPotential::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,
+                                    const std::vector<Pose>& poses, bool with_stiffness)
 {
   if (passes(on))
     return 0.0;
   const Pose& pose = poses[on.solid];
-  const ContactSegment& s = surface.segments[on.segment];
-  const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
+  const ContactSegment& s = surface_.segments[on.segment];
+  const ConvexPiece& piece = solids_[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
   const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position),
                         b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
   const double radius = thicknessOf(on);
-  if (leastDistance(piece, a, b) > radius + options.gap)
+  if (leastDistance(piece, a, b) > radius + options_.gap)
     return 0.0;
   const Eigen::Vector3d ends[2] = {a, b};
   PairGap gap = facePieceGap(ends, 2, radius, piece);
   const Eigen::Vector3d foot = a + gap.place[1] * (b - a) - radius * gap.normal;   // on the segment's surface
   gap.normal = pose.orientation * gap.normal;
   // behind the pairs of segments
-  Contact contact{static_cast<std::int64_t>(surface.segments.size()) + on.solid,
+  Contact contact{static_cast<std::int64_t>(surface_.segments.size()) + on.solid,
                   (static_cast<std::int64_t>(on.segment) << 32) + on.piece,
                   {s.a, s.b, -1, -1},
                   {},
@@ -241,15 +240,15 @@ double ContactPotential::Impl::addOnSolid(const Eigen::Matrix3Xd& x, const Candi
   return addContact(x, gap, contact, rangeOf(s.object, on.solid), with_stiffness);
 }
 
-double ContactPotential::Impl::addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale,
-                                          bool with_stiffness)
+double ContactPotential::addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale,
+                                    bool with_stiffness)
 {
   if (!(gap.gap > 0.0))
     return kInfinity;
   const double g = gap.gap / scale;
-  if (g >= options.gap)
+  if (g >= options_.gap)
     return 0.0;
-  const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier.force(g);
+  const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier_.force(g);
   copyFour(contact.weight, gap.place);
   contact.force = force * gap.weight * gap.normal;
   setTurns(x, contact);
@@ -258,29 +257,30 @@ double ContactPotential::Impl::addContact(const Eigen::Matrix3Xd& x, const PairG
   if (with_stiffness)
   {
     const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
-    const double own = pair_stiffness * barrier.stiffness(g) / scale * gap.weight * gap.weight;
+    const double own = pair_stiffness * barrier_.stiffness(g) / scale * gap.weight * gap.weight;
     term.stiffness = own * normals;
     if (contact.solid < 0)
       term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
     addMotion(gap, contact, force, own);
   }
-  contacts.push_back(contact);
-  smallest_gap = std::min(smallest_gap, gap.gap);
+  contacts_.push_back(contact);
+  smallest_gap_ = std::min(smallest_gap_, gap.gap);
   for (const int object : {contact.object, contact.other})
     if (object >= 0)
-      stiffness[object].take(force * gap.weight, pair_stiffness, g / options.gap);
-  return pair_stiffness * barrier.energy(g) * scale;
+      stiffness_[object].take(force * gap.weight, pair_stiffness, g / options_.gap);
+  return pair_stiffness * barrier_.energy(g) * scale;
 }
 
-double ContactPotential::Impl::stiffnessOf(const Contact& contact) const
+double ContactPotential::stiffnessOf(const Contact& contact) const
 {
-  return std::max(stiffness[contact.object].value(), contact.solid >= 0 ? surface.solids[contact.solid].least_stiffness
-                                                                        : stiffness[contact.other].value());
+  return std::max(stiffness_[contact.object].value(), contact.solid >= 0
+                                                          ? surface_.solids[contact.solid].least_stiffness
+                                                          : stiffness_[contact.other].value());
 }
 
-ContactTerm& ContactPotential::Impl::addTerm(const Contact& contact)
+ContactTerm& ContactPotential::addTerm(const Contact& contact)
 {
-  ContactTerm& term = terms.emplace_back();
+  ContactTerm& term = terms_.emplace_back();
   copyFour(term.point, contact.point);
   copyFour(term.weight, contact.weight);
   for (int k = 0; k < 2; ++k)
@@ -292,15 +292,15 @@ ContactTerm& ContactPotential::Impl::addTerm(const Contact& contact)
 
 /// The place of contact runs along the pieces as they turn: force r^T H^-1 r of the gap, column by column of
 /// H = L D L^T.
-void ContactPotential::Impl::addMotion(const PairGap& gap, const Contact& contact, double force, double own)
+void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, double force, double own)
 {
   constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
   const auto add = [&](const Eigen::Vector4d& along, const Eigen::Vector3d& turning, double d) {
     const double k = force / d;
     if (!(d > 0.0) || !(k * (along.squaredNorm() + turning.squaredNorm()) > kNegligible * own))
       return;
-    rows.emplace_back();
-    ContactRow& row = rows.back();
+    rows_.emplace_back();
+    ContactRow& row = rows_.back();
     copyFour(row.point, contact.point);
     row.solid = contact.solid;
     Eigen::Map<Eigen::Vector4d>(row.along) = along;
@@ -319,86 +319,26 @@ void ContactPotential::Impl::addMotion(const PairGap& gap, const Contact& contac
   }
 }
 
-ContactPotential::ContactPotential(ContactSurface surface, const ContactOptions& options)
-  : impl_(std::make_unique<Impl>(std::move(surface), options))
-{
-}
-
-ContactPotential::~ContactPotential() = default;
-ContactPotential::ContactPotential(ContactPotential&&) noexcept = default;
-const ContactOptions& ContactPotential::options() const { return impl_->options; }
-void ContactPotential::setPieces(const ContactSurface& surface) { impl_->setPieces(surface); }
-
-void ContactPotential::setRanges(std::size_t solid, const std::vector<std::pair<int, double>>& ranges)
-{
-  impl_->surface.solids[solid].ranges = ranges;
-}
-
-bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
-{
-  return impl_->thinToFit(x, solids);
-}
-
-const ContactSurface& ContactPotential::surface() const { return impl_->surface; }
-const std::vector<GridPairs::Pair>& ContactPotential::nearPairs() const { return impl_->nearPairs(); }
-
-double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids)
-{
-  return impl_->clearance(x, solids);
-}
-
 void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h)
 {
-  impl_->lagged.clear();
-  impl_->x_begin = x;
-  impl_->solids_begin = solids;
-  impl_->h = h;
-  impl_->evaluate(x, solids, false, nullptr);
-  for (BarrierStiffness& own : impl_->stiffness)
+  lagged_.clear();
+  x_begin_ = x;
+  solids_begin_ = solids;
+  h_ = h;
+  evaluate(x, solids, false, nullptr);
+  for (BarrierStiffness& own : stiffness_)
     own.beginStep();
-  impl_->lagFriction();
-  impl_->beginFollowing();   // The first friction replaces none, so that its change does not count as alternation.
+  lagFriction();
+  beginFollowing();   // The first friction replaces none, so that its change does not count as alternation.
 }
-
-void ContactPotential::letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids,
-                               const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
-{
-  impl_->letPass({x, x_end, solids, solids_end});
-}
-
-double ContactPotential::lagFriction() { return impl_->lagFriction(); }
-void ContactPotential::followFriction(const std::vector<Eigen::Vector3d>& moves) { impl_->follow(moves); }
-const std::vector<FrictionSpring>& ContactPotential::springs() const { return impl_->springs; }
-void ContactPotential::setSprings(const std::vector<FrictionSpring>& springs) { impl_->springs = springs; }
-void ContactPotential::keepSprings(const std::vector<Pose>& solids) { impl_->keepSprings(solids); }
-
-double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
-                                   const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
-{
-  return impl_->stepLimit(x, x_end, solids, solids_end);
-}
-
-bool ContactPotential::passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
-{
-  return impl_->passedThrough(x_end, solids_end);
-}
-
-double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
-                                  const Eigen::VectorXd* turns)
-{
-  return impl_->evaluate(x, solids, with_stiffness, turns);
-}
-
-const std::vector<ContactTerm>& ContactPotential::terms() const { return impl_->terms; }
-const std::vector<ContactRow>& ContactPotential::rows() const { return impl_->rows; }
 
 void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
 {
   // The terms of friction come after the normal ones and do not change, so that nothing is dragged along.
-  for (std::size_t k = 0; k < impl_->contacts.size(); ++k)
+  for (std::size_t k = 0; k < contacts_.size(); ++k)
   {
-    ContactTerm& term = impl_->terms[k];
-    if (term.solid < 0 || impl_->surface.solids[term.solid].body)
+    ContactTerm& term = terms_[k];
+    if (term.solid < 0 || surface_.solids[term.solid].body)
       continue;
     const Eigen::Vector3d motion =
         solids_end[term.solid] * (solids[term.solid].inverse() * term.position) - term.position;
@@ -407,42 +347,39 @@ void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vec
   }
 }
 
-double ContactPotential::smallestGap() const { return impl_->smallest_gap; }
-double ContactPotential::stiffness(int object) const { return impl_->stiffness[object].value(); }
-
 void ContactPotential::setStiffness(int object, double force, const BarrierRange& range)
 {
   if (!(force >= 0.0) || !std::isfinite(force))
     throw std::invalid_argument("contact: stiffness is " + std::to_string(force) +
                                 " N; must be finite and not negative");
-  impl_->stiffness[object].set(force, {std::max(range.least, impl_->options.least_stiffness),
-                                       std::max(range.most, impl_->options.least_stiffness)});
+  stiffness_[object].set(
+      force, {std::max(range.least, options_.least_stiffness), std::max(range.most, options_.least_stiffness)});
 }
 
 void ContactPotential::setStiffness(double force)
 {
-  for (std::size_t object = 0; object < impl_->stiffness.size(); ++object)
+  for (std::size_t object = 0; object < stiffness_.size(); ++object)
     setStiffness(static_cast<int>(object), force);
 }
 
 void ContactPotential::adaptStiffness()
 {
-  for (BarrierStiffness& own : impl_->stiffness)
-    own.adapt(impl_->barrier);
+  for (BarrierStiffness& own : stiffness_)
+    own.adapt(barrier_);
 }
 
 void ContactPotential::beginSolution()
 {
-  impl_->following = false;
-  for (BarrierStiffness& own : impl_->stiffness)
+  following_ = false;
+  for (BarrierStiffness& own : stiffness_)
     own.beginSolution();
 }
 
 bool ContactPotential::stiffen(bool converged)
 {
   bool changed = false;
-  for (BarrierStiffness& own : impl_->stiffness)
-    changed = own.stiffen(impl_->barrier, converged) || changed;
+  for (BarrierStiffness& own : stiffness_)
+    changed = own.stiffen(barrier_, converged) || changed;
   return changed;
 }
 

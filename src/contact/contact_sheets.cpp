@@ -3,12 +3,12 @@
 #include <cmath>
 #include <limits>
 
-#include "contact_potential_impl.h"
+#include "contact_potential.h"
 #include "slender_sim/contact/distance.h"
 
 namespace slender {
 
-double ContactPotential::Impl::addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
+double ContactPotential::addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
 {
   double energy = 0.0;
   for (const SheetCandidates::Pair& pair : near_.sheets().pairs())
@@ -20,10 +20,9 @@ double ContactPotential::Impl::addSheets(const Eigen::Matrix3Xd& x, const std::v
   return energy;
 }
 
-double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair,
-                                            bool with_stiffness)
+double ContactPotential::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness)
 {
-  const double thickness = thicknessOf(pair), range = thickness + pair.scale * options.gap;
+  const double thickness = thicknessOf(pair), range = thickness + pair.scale * options_.gap;
   Contact contact;
   PairGap gap;
   int object, other;
@@ -47,7 +46,7 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
   else
   {
     const SheetPieces::Point& p = sheets_.points[pair.first];
-    const ContactTriangle& t = surface.triangles[pair.second];
+    const ContactTriangle& t = surface_.triangles[pair.second];
     contact.point[0] = p.point;
     std::copy(t.corner.begin(), t.corner.end(), contact.point + 1);
     gap = pointTriangleGap(at(0), at(1), at(2), at(3), thickness);
@@ -58,7 +57,7 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
   if (gap.gap >= range - thickness)
     return 0.0;
   // behind the pairs of segments, and segments on solids; points behind edges
-  contact.first = static_cast<std::int64_t>(surface.segments.size() + solids.size()) + pair.first +
+  contact.first = static_cast<std::int64_t>(surface_.segments.size() + solids_.size()) + pair.first +
                   (pair.edges ? 0 : static_cast<std::int64_t>(sheets_.edges.size()));
   contact.second = pair.second;
   contact.solid = -1;
@@ -71,26 +70,26 @@ double ContactPotential::Impl::addSheetPair(const Eigen::Matrix3Xd& x, const She
   return addContact(x, gap, contact, pair.scale, with_stiffness);
 }
 
-double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
-                                               const std::vector<Pose>& poses, bool with_stiffness)
+double ContactPotential::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
+                                         const std::vector<Pose>& poses, bool with_stiffness)
 {
   if (passes(on))
     return 0.0;
   const Pose& pose = poses[on.solid];
   const SheetPieces::Face& face = on.face;
-  const ConvexPiece& piece = solids[on.solid].pieces[on.piece];
+  const ConvexPiece& piece = solids_[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
   Eigen::Vector3d z[3];
   for (int k = 0; k < face.corners; ++k)
     z[k] = to_solid * Eigen::Vector3d(x.col(face.corner[k]) - pose.position);
   const double radius = thicknessOf(on);
-  if (leastFaceDistance(piece, z, face.corners) >= radius + options.gap)
+  if (leastFaceDistance(piece, z, face.corners) >= radius + options_.gap)
     return 0.0;
   PairGap gap = facePieceGap(z, face.corners, radius, piece);
-  if (gap.gap >= options.gap)
+  if (gap.gap >= options_.gap)
     return 0.0;
   Contact contact;
-  contact.first = static_cast<std::int64_t>(surface.segments.size() + solids.size() + sheets_.edges.size() +
+  contact.first = static_cast<std::int64_t>(surface_.segments.size() + solids_.size() + sheets_.edges.size() +
                                             sheets_.points.size()) +
                   3 * on.solid + face.corners - 1;
   contact.second = (static_cast<std::int64_t>(face.index) << 32) + on.piece;
@@ -108,16 +107,16 @@ double ContactPotential::Impl::addSheetOnSolid(const Eigen::Matrix3Xd& x, const 
   return addContact(x, gap, contact, rangeOf(face.object, on.solid), with_stiffness);
 }
 
-double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,
-                                           const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
-                                           const std::vector<Pose>& poses_end) const
+double ContactPotential::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,
+                                     const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
+                                     const std::vector<Pose>& poses_end) const
 {
   double share = 1.0;
   ApproachLimit limit;
   const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
   for (const SheetCandidates::Pair& pair : candidates.sheets().pairs())
   {
-    limit.reach = pair.scale * options.gap;
+    limit.reach = pair.scale * options_.gap;
     limit.thickness = thicknessOf(pair);
     if (pair.edges)
     {
@@ -125,7 +124,7 @@ double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const E
       share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
       continue;
     }
-    const auto& c = surface.triangles[pair.second].corner;
+    const auto& c = surface_.triangles[pair.second].corner;
     const int p = sheets_.points[pair.first].point;
     share = std::min(share, pointTriangleLimit(motion(p), motion(c[0]), motion(c[1]), motion(c[2]), limit));
   }
@@ -139,16 +138,16 @@ double ContactPotential::Impl::sheetsLimit(const Candidates& candidates, const E
       rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
     solid = on.solid;
     limit.thickness = thicknessOf(on);
-    limit.reach = rangeOf(on.face.object, on.solid) * options.gap;
+    limit.reach = rangeOf(on.face.object, on.solid) * options_.gap;
     MovingPoint corner[3];
     for (int k = 0; k < on.face.corners; ++k)
       corner[k] = motion(on.face.corner[k]);
-    share = std::min(share, faceSolidLimit(corner, on.face.corners, solids[on.solid].pieces[on.piece], rigid, limit));
+    share = std::min(share, faceSolidLimit(corner, on.face.corners, solids_[on.solid].pieces[on.piece], rigid, limit));
   }
   return share;
 }
 
-bool ContactPotential::Impl::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+bool ContactPotential::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   for (const SheetCandidates::Pair& pair : near_.sheets().pairs())
   {
@@ -160,7 +159,7 @@ bool ContactPotential::Impl::thinSheetsToFit(const Eigen::Matrix3Xd& x, const st
     }
     else
     {
-      const auto& c = surface.triangles[pair.second].corner;
+      const auto& c = surface_.triangles[pair.second].corner;
       distance = pointTriangleDistance(x.col(sheets_.points[pair.first].point), x.col(c[0]), x.col(c[1]), x.col(c[2]));
     }
     if (!fit(thin_sheets_, keyOf(pair), distance, pair.thickness))
@@ -174,9 +173,9 @@ bool ContactPotential::Impl::thinSheetsToFit(const Eigen::Matrix3Xd& x, const st
     Eigen::Vector3d z[3];
     for (int k = 0; k < on.face.corners; ++k)
       z[k] = to_solid * Eigen::Vector3d(x.col(on.face.corner[k]));
-    FacePlane plane = separatingPlane(solids[on.solid].pieces[on.piece], z, on.face.corners, on.face.radius);
+    FacePlane plane = separatingPlane(solids_[on.solid].pieces[on.piece], z, on.face.corners, on.face.radius);
     if (plane.meets)
-      plane = separatingPlane(solids[on.solid].pieces[on.piece], z, on.face.corners, 0.0);
+      plane = separatingPlane(solids_[on.solid].pieces[on.piece], z, on.face.corners, 0.0);
     if (!fit(thin_sheets_on_solids_, keyOf(on), plane.distance, on.face.radius))
       return false;
   }

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "contact_potential_impl.h"
+#include "contact_potential.h"
 #include "slender_sim/contact/friction.h"
 
 namespace slender {
@@ -47,21 +47,21 @@ bool operator<(const FrictionSpring& a, const FrictionSpring& b)
   return key(a) < key(b);
 }
 
-double ContactPotential::Impl::frictionOf(const Contact& contact) const
+double ContactPotential::frictionOf(const Contact& contact) const
 {
-  const double own = surface.objects[contact.object].friction;
+  const double own = surface_.objects[contact.object].friction;
   const double other =
-      contact.solid >= 0 ? surface.solids[contact.solid].friction : surface.objects[contact.other].friction;
+      contact.solid >= 0 ? surface_.solids[contact.solid].friction : surface_.objects[contact.other].friction;
   return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
 /// Finds how friction turns the curves of a contact. The lever reaches from the centreline to the place where the force
 /// acts. If a curve touches a solid or another curve, that place is on the surface of the curve. If it touches a cloth,
 /// the place is on the middle surface of the cloth, so that the moments on both are opposite.
-void ContactPotential::Impl::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
+void ContactPotential::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
 {
-  const bool turns[2] = {surface.objects[contact.object].turns,
-                         contact.other >= 0 && surface.objects[contact.other].turns};
+  const bool turns[2] = {surface_.objects[contact.object].turns,
+                         contact.other >= 0 && surface_.objects[contact.other].turns};
   if (!turns[0] && !turns[1])
     return;
   Eigen::Vector3d middle[2] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
@@ -73,37 +73,37 @@ void ContactPotential::Impl::setTurns(const Eigen::Matrix3Xd& x, Contact& contac
   for (int side = 0; side < 2; ++side)
     if (turns[side])
     {
-      const ContactSegment& s = surface.segments[segment_of_point_[contact.point[2 * side]]];
+      const ContactSegment& s = surface_.segments[segment_of_point_[contact.point[2 * side]]];
       const Eigen::Vector3d tangent = (x.col(s.b) - x.col(s.a)).normalized();
       contact.turn[side] = {s.a, (side == 0 ? 1.0 : -1.0) * tangent.cross(place - middle[side])};
     }
 }
 
-double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
-                                           const Eigen::VectorXd* turns, Contact& contact, bool with_stiffness)
+double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
+                                     const Eigen::VectorXd* turns, Contact& contact, bool with_stiffness)
 {
   const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   if (!(most > 0.0))
     return 0.0;
   ContactTerm& term = addTerm(contact);
   Eigen::Vector3d u = Eigen::Vector3d::Zero();
-  const int carrier = surface.objects[contact.object].carrier;
+  const int carrier = surface_.objects[contact.object].carrier;
   term.carried = carrier >= 0;
   if (term.carried)
-    u = poses[carrier] * contact.own - solids_begin[carrier] * contact.own;
+    u = poses[carrier] * contact.own - solids_begin_[carrier] * contact.own;
   for (int i = 0; i < 4 && !term.carried; ++i)
     if (contact.point[i] >= 0)
-      u += contact.weight[i] * (x.col(contact.point[i]) - x_begin.col(contact.point[i]));
+      u += contact.weight[i] * (x.col(contact.point[i]) - x_begin_.col(contact.point[i]));
   if (contact.solid >= 0)
   {
     term.position = poses[contact.solid] * contact.material;
-    u -= term.position - solids_begin[contact.solid] * contact.material;
+    u -= term.position - solids_begin_[contact.solid] * contact.material;
   }
   term.turn = contact.turn;
   for (const ContactTerm::Turn& turn : contact.turn)
     if (turns && turn.point >= 0)
       u += (*turns)[turn.point] * turn.column;
-  const SmoothedCoulomb law{options.slip_speed * h};
+  const SmoothedCoulomb law{options_.slip_speed * h_};
   const Eigen::Vector3d n = contact.force / normal_force;
   Eigen::Vector3d tension = contact.tension_begin;
   if (const double angle = turnsWithSolid(contact) ? spin(contact, poses) : 0.0; angle != 0.0)
@@ -144,45 +144,45 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
   return most * law.energy(y);
 }
 
-void ContactPotential::Impl::beginFollowing()
+void ContactPotential::beginFollowing()
 {
   constexpr int kMostFollows = 20;   // Contacts that alternately stick and slip would follow without end.
-  following = false;
+  following_ = false;
   follows_left_ = kMostFollows;
   last_change_ = kInfinity;
   relaxation_ = 1.0;
 }
 
-void ContactPotential::Impl::follow(const std::vector<Eigen::Vector3d>& moves)
+void ContactPotential::followFriction(const std::vector<Eigen::Vector3d>& moves)
 {
   constexpr double kFar = 3.0;   // smallest gaps: the change of a force is not linear over such distances
-  following =
-      std::all_of(moves.begin(), moves.end(), [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap; });
+  following_ = std::all_of(moves.begin(), moves.end(),
+                           [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap_; });
   predicted_.clear();
-  for (std::size_t k = 0; following && k < contacts.size(); ++k)   // The normal terms come first, in this order.
+  for (std::size_t k = 0; following_ && k < contacts_.size(); ++k)   // The normal terms come first, in this order.
   {
-    const Contact& c = contacts[k];
-    const double size = c.force.norm(), change = -c.force.normalized().dot(terms[k].stiffness * moves[k]);
+    const Contact& c = contacts_[k];
+    const double size = c.force.norm(), change = -c.force.normalized().dot(terms_[k].stiffness * moves[k]);
     predicted_.push_back({c.first, c.second, std::max(0.0, size + change)});
   }
 }
 
 /// Adds the friction of all contacts. Its normal forces are those of an earlier configuration or, if friction follows,
 /// predicted ones.
-double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
-                                           const Eigen::VectorXd* turns, bool with_stiffness)
+double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
+                                     const Eigen::VectorXd* turns, bool with_stiffness)
 {
   const auto sum = [&](bool stiffness) {
     double energy = 0.0;
-    for (Contact& contact : lagged)
+    for (Contact& contact : lagged_)
       energy += addFriction(x, poses, turns, contact, stiffness);
     return energy;
   };
-  if (!following || !with_stiffness || follows_left_ == 0)
+  if (!following_ || !with_stiffness || follows_left_ == 0)
     return sum(with_stiffness) + shift_;
-  const std::size_t others = terms.size();
+  const std::size_t others = terms_.size();
   const double before = sum(false) + shift_;
-  terms.resize(others);
+  terms_.resize(others);
   if (lagFriction(kLagTolerance, true) > kLagTolerance)
     --follows_left_;
   shift_ = before - sum(true);
@@ -191,16 +191,16 @@ double ContactPotential::Impl::addFriction(const Eigen::Matrix3Xd& x, const std:
 
 /// Does not take the new forces over if they have changed by less than `least`. `predicted`: instead of present normal
 /// forces it takes the predicted ones of the same contacts.
-double ContactPotential::Impl::lagFriction(double least, bool predicted)
+double ContactPotential::lagFriction(double least, bool predicted)
 {
   const auto comes_before = [](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : a.second < b.second;
   };
   double change = 0.0, largest = 0.0;
-  auto old = lagged.begin();
+  auto old = lagged_.begin();
   auto before = predicted_.begin();
   rubbing_.clear();
-  for (const Contact& present : contacts)
+  for (const Contact& present : contacts_)
   {
     const double friction = frictionOf(present);
     if (!(friction > 0.0))
@@ -215,9 +215,9 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
     contact.friction = friction;
     if (predicted)
       contact.force = before->size * present.force.normalized();
-    for (; old != lagged.end() && comes_before(*old, contact); ++old)
+    for (; old != lagged_.end() && comes_before(*old, contact); ++old)
       change = std::max(change, old->force.norm());
-    const bool same = old != lagged.end() && !comes_before(contact, *old);
+    const bool same = old != lagged_.end() && !comes_before(contact, *old);
     change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
     largest = std::max(largest, contact.force.norm());
     if (same && predicted)
@@ -239,30 +239,30 @@ double ContactPotential::Impl::lagFriction(double least, bool predicted)
       contact.tension = old->tension;
       ++old;
     }
-    else if (!springs.empty())
+    else if (!springs_.empty())
     {
       const FrictionSpring wanted = springOf(contact);
-      const auto spring = std::lower_bound(springs.begin(), springs.end(), wanted);
-      if (spring != springs.end() && !(wanted < *spring))
+      const auto spring = std::lower_bound(springs_.begin(), springs_.end(), wanted);
+      if (spring != springs_.end() && !(wanted < *spring))
         contact.tension = contact.tension_begin = spring->tension;
     }
   }
-  for (; old != lagged.end(); ++old)
+  for (; old != lagged_.end(); ++old)
     change = std::max(change, old->force.norm());
-  for (const Contact& contact : lagged)
+  for (const Contact& contact : lagged_)
     largest = std::max(largest, contact.force.norm());
   const double share = largest > 0.0 ? change / largest : 0.0;
   shift_ = 0.0;
   if (!predicted)
     relax(share);
   if (share >= least)
-    lagged.swap(rubbing_);
+    lagged_.swap(rubbing_);
   return share;
 }
 
 /// Solutions with lagged friction may alternate between two states. If the change of the forces hardly becomes smaller,
 /// friction takes over only a part of it from then on.
-void ContactPotential::Impl::relax(double change)
+void ContactPotential::relax(double change)
 {
   constexpr double kHardly = 0.7;   // of the change before; where forces alternate, it stays near 1
   constexpr double kLeast = 0.25;
@@ -272,7 +272,7 @@ void ContactPotential::Impl::relax(double change)
 }
 
 /// The spring of a contact, without its tension.
-FrictionSpring ContactPotential::Impl::springOf(const Contact& contact) const
+FrictionSpring ContactPotential::springOf(const Contact& contact) const
 {
   FrictionSpring spring;
   spring.object = contact.object;
@@ -280,8 +280,8 @@ FrictionSpring ContactPotential::Impl::springOf(const Contact& contact) const
   spring.solid = contact.solid;
   if (contact.solid >= 0)
     spring.piece = static_cast<int>(contact.second & 0xffffffff);
-  const auto [first, second] = std::minmax({surface.objects[contact.object].first_point,
-                                            surface.objects[std::max(contact.object, contact.other)].first_point});
+  const auto [first, second] = std::minmax({surface_.objects[contact.object].first_point,
+                                            surface_.objects[std::max(contact.object, contact.other)].first_point});
   for (int k = 0; k < 4; ++k)
     if (const int point = contact.point[k]; point >= 0)
       spring.point[k] = point - (point < second ? first : second);
@@ -289,42 +289,42 @@ FrictionSpring ContactPotential::Impl::springOf(const Contact& contact) const
 }
 
 /// Springs turn with a solid that moves as prescribed while the step is solved, and with bodies when it has ended.
-bool ContactPotential::Impl::turnsWithSolid(const Contact& contact) const
+bool ContactPotential::turnsWithSolid(const Contact& contact) const
 {
-  return contact.solid >= 0 && !surface.solids[contact.solid].body;
+  return contact.solid >= 0 && !surface_.solids[contact.solid].body;
 }
 
 /// The angle by which a prescribed solid has turned about the normal since the step began [rad]; else the mean angle of
 /// the bodies that touch.
-double ContactPotential::Impl::spin(const Contact& contact, const std::vector<Pose>& poses) const
+double ContactPotential::spin(const Contact& contact, const std::vector<Pose>& poses) const
 {
   const Eigen::Vector3d normal = contact.force.normalized();
   double sum = 0.0;
   int count = 0;
-  const int carrier = turnsWithSolid(contact) ? -1 : surface.objects[contact.object].carrier;
+  const int carrier = turnsWithSolid(contact) ? -1 : surface_.objects[contact.object].carrier;
   for (const int solid : {contact.solid, carrier})
     if (solid >= 0)
     {
-      sum += turnAbout(normal, solids_begin[solid], poses[solid]);
+      sum += turnAbout(normal, solids_begin_[solid], poses[solid]);
       ++count;
     }
   return count > 0 ? sum / count : 0.0;
 }
 
-void ContactPotential::Impl::keepSprings(const std::vector<Pose>& poses)
+void ContactPotential::keepSprings(const std::vector<Pose>& poses)
 {
-  const auto isStrand = [&](int object) { return object >= 0 && surface.objects[object].owner >= 0; };
-  springs.clear();
-  for (const Contact& contact : lagged)
+  const auto isStrand = [&](int object) { return object >= 0 && surface_.objects[object].owner >= 0; };
+  springs_.clear();
+  for (const Contact& contact : lagged_)
   {
     if (!(contact.tension.squaredNorm() > 0.0) || isStrand(contact.object) || isStrand(contact.other))
       continue;
-    springs.push_back(springOf(contact));
-    springs.back().tension = contact.tension;
+    springs_.push_back(springOf(contact));
+    springs_.back().tension = contact.tension;
     if (!turnsWithSolid(contact))
-      springs.back().tension = Eigen::AngleAxisd(spin(contact, poses), contact.force.normalized()) * contact.tension;
+      springs_.back().tension = Eigen::AngleAxisd(spin(contact, poses), contact.force.normalized()) * contact.tension;
   }
-  std::sort(springs.begin(), springs.end());
+  std::sort(springs_.begin(), springs_.end());
 }
 
 }   // namespace slender

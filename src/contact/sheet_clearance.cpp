@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact_potential_impl.h"
+#include "contact_potential.h"
 #include "convex_minimum.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/contact/intersection.h"
@@ -145,24 +145,24 @@ double faceDistance(const ConvexPiece& piece, const Eigen::Vector3d* z, int corn
 
 }   // namespace
 
-double ContactPotential::Impl::sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, double least)
+double ContactPotential::sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, double least)
 {
-  const std::vector<Piece> pieces = piecesOf(surface, x, options.gap);
-  const PairClearance clearance(surface, x, options.gap);
+  const std::vector<Piece> pieces = piecesOf(surface_, x, options_.gap);
+  const PairClearance clearance(surface_, x, options_.gap);
   for (std::size_t p = 0; p < pieces.size(); ++p)
     for (std::size_t q = p + 1; q < pieces.size() && pieces[q].box.low.x() <= pieces[p].box.high.x(); ++q)
     {
       const Piece &a = pieces[p], &b = pieces[q];
-      const ContactObject &c = surface.objects[a.object], &d = surface.objects[b.object];
+      const ContactObject &c = surface_.objects[a.object], &d = surface_.objects[b.object];
       if ((a.corners == 3 || b.corners == 3) && (a.object == b.object ? c.self : c.others && d.others) &&
           a.box.overlaps(b.box))
         least = std::min(least, clearance(a, b));
     }
-  for (std::size_t k = 0; k < solids.size(); ++k)
+  for (std::size_t k = 0; k < solids_.size(); ++k)
     for (const Piece& t : pieces)
     {
-      const ContactSolid& solid = surface.solids[k];
-      if (t.corners != 3 || !mayTouch(surface, t.object, solid))
+      const ContactSolid& solid = surface_.solids[k];
+      if (t.corners != 3 || !mayTouch(surface_, t.object, solid))
         continue;
       // What is driven does not touch what is driven: the free corners, or the edge between them, remain.
       Eigen::Vector3d z[3];
@@ -174,7 +174,7 @@ double ContactPotential::Impl::sheetClearance(const Eigen::Matrix3Xd& x, const s
           points[corners] = t.corner[i];
           z[corners++] = to_solid * t.at(x, i);
         }
-      if (corners == 0 || passesThrough(surface, t.object, points, corners, solid))
+      if (corners == 0 || passesThrough(surface_, t.object, points, corners, solid))
         continue;
       // No place of the face is farther from its middle than this, and distances do not change faster.
       Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -183,9 +183,9 @@ double ContactPotential::Impl::sheetClearance(const Eigen::Matrix3Xd& x, const s
         middle += z[i] / corners;
       for (int i = 0; i < corners; ++i)
         extent = std::max(extent, (z[i] - middle).norm());
-      if (middle.norm() > boundingRadius(solid.shape) + options.gap + t.radius + extent)
+      if (middle.norm() > boundingRadius(solid.shape) + options_.gap + t.radius + extent)
         continue;
-      for (const ConvexPiece& piece : solids[k].pieces)
+      for (const ConvexPiece& piece : solids_[k].pieces)
         if (pieceDistance(piece, middle).distance - extent - t.radius < least)
           least = std::min(least, faceDistance(piece, z, corners) - t.radius);
     }

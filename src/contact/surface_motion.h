@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "mesh_tree.h"
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/contact/solids.h"
 
 namespace slender {

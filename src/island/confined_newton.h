@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "contact/contact_potential.h"
 #include "slender_sim/dynamics/newton.h"
 #include "slender_sim/linalg/interruption.h"
 

@@ -8,7 +8,7 @@
 #include "island/average_constraints.h"
 #include "island/part_statics.h"
 #include "island/shared_matrix.h"
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/dynamics/failure_place.h"
 #include "slender_sim/dynamics/hessian_shift.h"
 #include "slender_sim/dynamics/integrator.h"

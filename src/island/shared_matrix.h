@@ -7,11 +7,26 @@
 #include <vector>
 
 #include "island/point_sweeps.h"
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
+
+/// Decides when to try again a method that may fail. After each failure in a row it skips more attempts: 1, 3, 7, 15.
+class Backoff
+{
+public:
+  bool due() { return --after_ < 0; }
+  void tried(bool succeeded)
+  {
+    pause_ = succeeded ? 0 : std::min(15, 2 * pause_ + 1);
+    after_ = pause_;
+  }
+
+private:
+  int after_ = 0, pause_ = 0;
+};
 
 /// The sparse symmetric matrix of unknowns that contacts or bodies couple, with its right-hand side and solution.
 ///

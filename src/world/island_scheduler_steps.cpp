@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "contact/contact_potential.h"
 #include "island_scheduler.h"
 #include "meeting.h"
 #include "slender_sim/contact/solids.h"

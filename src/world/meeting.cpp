@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "contact/contact_potential.h"
 #include "slender_sim/contact/solids.h"
 
 namespace slender {

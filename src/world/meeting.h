@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 
 namespace slender {
 

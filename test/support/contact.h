@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "contact/contact_potential.h"
 #include "slender_sim/geometry/rotation.h"
 #include "test/support/random.h"
 

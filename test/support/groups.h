@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "contact/contact_potential.h"
 #include "slender_sim/world/world.h"
 #include "test/support/rods.h"
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "contact/contact_potential.h"
 #include "slender_sim/contact/solids.h"
 #include "test/support/random.h"
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "contact/contact_potential.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/simulation.h"
 

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/contact/impulses/surface_collider.h"
 
 /// Intersections of triangles as they stand, decided exactly whatever the rounding, and without any search structure of

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "slender_sim/cloth/cloth_stepper.h"
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/contact/contact_properties.h"
 #include "slender_sim/contact/obstacle.h"
 #include "slender_sim/rod/rigid_body.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/contact/intersection.h"
 #include "slender_sim/contact/solids.h"

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "slender_sim/contact/contact_potential.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/dynamics/work_budget.h"
 
 namespace slender {

@@ -1,0 +1,320 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <vector>
+
+#include "barrier_stiffness.h"
+#include "candidates.h"
+#include "held_pieces.h"
+#include "slender_sim/contact/barrier.h"
+#include "slender_sim/contact/contact_surface.h"
+#include "soft_gap.h"
+#include "pair_gap.h"
+
+namespace slender {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kTurnMargin = 0.02;   ///< [rad] a solid may turn before candidates are sought again
+
+template <class To, class From>
+void copyFour(To& to, const From& from)
+{
+  std::copy(std::begin(from), std::end(from), std::begin(to));
+}
+
+/// Barrier potential of surfaces that may not touch, with Coulomb friction by lagged normal forces and tangential
+/// springs [Li et al., Incremental Potential Contact, SIGGRAPH 2020; with thickness: Codimensional IPC, 2021]. It is
+/// infinite where surfaces meet, except where an edge has passed through the inside of a triangle. With stepLimit() the
+/// iterates of a minimisation never get to either. Memory is reused from step to step.
+///
+/// The pairs are: two edges (segments, and edges of triangles), a point and a triangle (corners, and ends of segments),
+/// a segment and a solid, and a triangle (or a free edge or corner) and a solid. All of them have energies that are
+/// once continuously differentiable, see soft_gap.h and pair_gap.h.
+class ContactPotential
+{
+public:
+  ContactPotential(ContactSurface surface, const ContactOptions& options);
+  const ContactOptions& options() const { return options_; }
+
+  /// Takes the points, segments, triangles, and objects of another surface, which must be sound; the solids stay. For
+  /// curves that are fed and divided while they move.
+  void setPieces(const ContactSurface& surface);
+  /// Takes the ranges of a solid.
+  void setRanges(std::size_t solid, const std::vector<std::pair<int, double>>& ranges)
+  {
+    surface_.solids[solid].ranges = ranges;
+  }
+  /// Thins segments and triangles where others, or solids, are nearer than a twentieth of the gap, or overlap: to a
+  /// sixteenth of it. What was brought together by something else than motion (a division, growing radii) can so begin
+  /// a step. False: two centrelines or middle surfaces, or one and a solid, meet.
+  bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  const ContactSurface& surface() const { return surface_; }
+  /// Pairs of segments that thinToFit() found near each other: all those within the gap, and more. First and second are
+  /// in order.
+  const std::vector<GridPairs::Pair>& nearPairs() const { return near_.pairs(); }
+
+  /// Smallest distance [m] between surfaces at points x (3 x points) and solids' poses, up to the gap; zero or less:
+  /// they meet. Triangles that an edge passes through meet it. If a piece has held points, only its free corners and
+  /// the edges between them count against solids that move as prescribed. Shares no search structure and no
+  /// minimisation with the rest of this class. The surface of a mesh is touched from both sides.
+  double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+
+  /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
+  /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from
+  /// earlier steps but stiffness() and springs().
+  void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
+  /// Tells where prescribed points and solids go in the next solution: from (x, solids) to (x_end, solids_end). If a
+  /// prescribed solid comes too near to held points, neither can give way. Then the pieces at these points let the
+  /// solid pass: only their free corners, and the edges between free corners, touch it. Too near is less than the gap;
+  /// for triangles, less than the room that a layer of cloth needs. A piece touches the solid again when it is apart
+  /// from the solid and its held points are not too near.
+  void letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, const Eigen::Matrix3Xd& x_end,
+               const std::vector<Pose>& solids_end);
+  /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
+  /// of a contact's force over the largest force.
+  double lagFriction() { return lagFriction(0.0, false); }
+  /// A change that lagFriction() returns is negligible if it is at most this [-].
+  static constexpr double kLagTolerance = 1e-2;
+  /// Tells how far the direction of an iteration moves the u of each term of terms() [m], after an evaluate() with
+  /// stiffness. The next evaluate() with stiffness first gives friction the normal forces that the terms predict, to
+  /// first order, for the end of the iteration. They are closer to the solution than those of the iterates, in which
+  /// gaps are too small or too large. Friction does not change if the change is negligible, or if a contact moves by
+  /// more than three times the smallest gap. A constant is added to the potential, so that the potential does not jump.
+  /// Friction follows a limited number of times after begin(), because a minimisation might not end otherwise.
+  /// beginSolution() forgets the directions before.
+  void followFriction(const std::vector<Eigen::Vector3d>& moves);
+  /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
+  /// threads have none, because their pieces change.
+  const std::vector<FrictionSpring>& springs() const { return springs_; }
+  void setSprings(const std::vector<FrictionSpring>& springs) { springs_ = springs; }
+  /// The last evaluate() was where a step, or a stage of it, ends, with the solids at these poses. springs() become
+  /// those from which the next one begins.
+  void keepSprings(const std::vector<Pose>& solids);
+
+  /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance
+  /// between surfaces at least a fifth, or a fifth of the gap. Points go along straight lines; solids' origins too,
+  /// while they turn uniformly by the smaller angle. Conservative [Li et al. 2021, additive CCD]: misses nothing. 0 if
+  /// surfaces meet at x.
+  double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
+                   const std::vector<Pose>& solids_end);
+
+  /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
+  /// had moved straight from begin() to their present places. In one long step the iterates of a solution can go around
+  /// the rim of a cloth, or the end of a curve, without touching it. Things that moved less than half of the shortest
+  /// edge of the cloth or curve against it are not examined.
+  bool passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
+
+  /// Returns the potential [J] at a configuration, plus the constant of followFriction(). It is infinite where surfaces
+  /// meet or x is not finite. Fills terms(), in an order that depends on x and solids only; their stiffness and rows()
+  /// are computed only on request. The second derivative is exact for pairs of segments and triangles. For solids, the
+  /// parts that come from their own curvature and rotation are left out. For friction that slips back and forth, the
+  /// secant is used. `turns` has one entry per point: by how much the segment that begins there has turned about its
+  /// tangent since begin() [rad]. Null means that no segment has turned.
+  double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
+                  const Eigen::VectorXd* turns = nullptr);
+  const std::vector<ContactTerm>& terms() const { return terms_; }
+  const std::vector<ContactRow>& rows() const { return rows_; }
+  /// Adds to the normal forces of terms() what they gain, to first order, when the solids that move as prescribed go
+  /// from `solids` to `solids_end`. Forces that would become smaller do not change. The last evaluate() must have
+  /// computed the stiffness of the terms.
+  void pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
+
+  /// Smallest softened gap of the last evaluate() [m]; infinity without contact.
+  double smallestGap() const { return smallest_gap_; }
+
+  /// Force [N] of the barrier about an object at half the gap. The barrier between two objects has the larger stiffness
+  /// of the two, and that between an object and a solid is no softer than ContactSolid::least_stiffness.
+  /// adaptStiffness(), after a step, follows the largest normal force on each object in the last evaluate(): it aims at
+  /// a smallest gap of a fifth and acts outside a twelfth to a half. It makes the barrier stiffer only where stiffen()
+  /// would. Part of a simulation's state.
+  double stiffness(int object) const { return stiffness_[object].value(); }
+  /// Sets the stiffness about an object to `force` [N], or to the nearest value in the range. The range holds until the
+  /// next call, and its least value is at least ContactOptions::least_stiffness.
+  void setStiffness(int object, double force, const BarrierRange& range = {});
+  void setStiffness(double force);   ///< of all objects
+  void adaptStiffness();
+  /// Makes the barrier stiffer about objects whose smallest gap is too small to be resolved: it is below a twelfth of
+  /// options().gap and has shrunk since begin(), or it is below a fiftieth. If the last solution has `converged`, the
+  /// stiffness becomes what adaptStiffness() chooses; otherwise it grows four- to a hundredfold. In a narrow place a
+  /// stiffer barrier opens no gap. The next call finds this, takes the stiffness back, and the object keeps it until
+  /// begin(). Returns whether a barrier has changed.
+  bool stiffen(bool converged);
+  /// Call this when a solution begins, after evaluate() at its start. stiffen() compares later gaps with those of that
+  /// evaluation. Switches followFriction() off.
+  void beginSolution();
+
+private:
+  /// A touching pair as friction needs it.
+  struct Contact
+  {
+    std::int64_t first, second;   ///< what touches: orders contacts
+    int point[4];
+    double weight[4];
+    int solid;
+    Eigen::Vector3d material;          ///< in the solid's frame
+    Eigen::Vector3d position, force;   ///< normal force on u
+    int object, other;                 ///< that touch; other: -1 for a solid
+    double friction = 0.0;             ///< of the two, once the contact is lagged
+    /// Of its spring: force where the step begins, and in the last evaluation.
+    Eigen::Vector3d tension_begin = Eigen::Vector3d::Zero(), tension = Eigen::Vector3d::Zero();
+    Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< the position in the frame of the carrier, if there is one
+    std::array<ContactTerm::Turn, 2> turn{};         ///< of friction
+    /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
+    bool has_iterate = false;
+    Eigen::Vector3d last_slip = Eigen::Vector3d::Zero(), last_force = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d last_stiffness = Eigen::Matrix3d::Zero();
+  };
+
+  /// Normal force of a contact at the end of an iteration, as followFriction() predicts it [N].
+  struct PredictedForce
+  {
+    std::int64_t first, second;   ///< of the contact
+    double size;
+  };
+
+  void beginFollowing();
+  double lagFriction(double least, bool predicted);
+  void relax(double change);
+  void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
+  /// How the points of an object have moved since begin() [m].
+  struct Displacements
+  {
+    BoundingBox box = BoundingBox::empty();
+    double shortest_edge = std::numeric_limits<double>::infinity();   ///< [m]; infinite without edges
+    bool has_triangles = false;
+  };
+  void takeDisplacements(const Eigen::Matrix3Xd& x_end);
+  bool movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
+  double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
+  double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const std::vector<Pose>& poses,
+                    bool with_stiffness);
+  double addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
+  double addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness);
+  double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const std::vector<Pose>& poses,
+                         bool with_stiffness);
+  /// Sets the place of a contact in the frame of the body that carries the first piece. Friction needs it.
+  void setOwn(Contact& contact, const std::vector<Pose>& poses) const
+  {
+    if (const int carrier = surface_.objects[contact.object].carrier; carrier >= 0)
+      contact.own = poses[carrier].inverse() * contact.position;
+  }
+  /// `scale`: of the gap at which the pair repels.
+  double addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
+  void setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const;
+  void listSegments();
+  /// Appends a term of a contact, without its force.
+  ContactTerm& addTerm(const Contact& contact);
+  void addMotion(const PairGap& gap, const Contact& contact, double force, double own);
+  /// Share of the gap at which an object and a solid repel each other.
+  double rangeOf(int object, int solid) const
+  {
+    const auto& ranges = surface_.solids[solid].ranges;
+    const auto at = std::lower_bound(ranges.begin(), ranges.end(), object,
+                                     [](const auto& range, int wanted) { return range.first < wanted; });
+    return at == ranges.end() || at->first != object ? 1.0 : at->second;
+  }
+  double frictionOf(const Contact& contact) const;
+  double stiffnessOf(const Contact& contact) const;
+  FrictionSpring springOf(const Contact& contact) const;
+  bool turnsWithSolid(const Contact& contact) const;
+  double spin(const Contact& contact, const std::vector<Pose>& poses) const;
+  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
+                     bool with_stiffness);
+  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
+                     Contact& contact, bool with_stiffness);
+  double restart();
+
+  /// What thinToFit() made room for, and the distance [m] that remains forbidden there. Only this pair is thinner: a
+  /// segment that overlaps one neighbour keeps its distance from all others.
+  struct Thinned
+  {
+    std::array<int, 3> key;   ///< two segments; or a solid, a segment and a piece
+    double thickness;
+    bool operator<(const Thinned& other) const { return key < other.key; }
+  };
+  /// Thins a pair at this distance if it has to be; `scale`: of its gap. False: the pieces meet.
+  bool fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness,
+           double scale = 1.0) const;
+  bool thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  static double thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness);
+  /// Share of thickness and gap that a pair of segments keeps, see contactShare().
+  double scaleOf(const ContactSegment& a, const ContactSegment& b) const
+  {
+    return a.object == b.object ? contactShare(a, b, surface_.objects[a.object], options_.gap) : 1.0;
+  }
+  static double fullThickness(const ContactSegment& a, const ContactSegment& b, double scale)
+  {
+    return scale * (a.coreRadius() + b.coreRadius());
+  }
+  /// Distances of centrelines [m] at which pairs touch.
+  double thicknessOf(const GridPairs::Pair& pair, double scale) const
+  {
+    const double full = fullThickness(surface_.segments[pair.first], surface_.segments[pair.second], scale);
+    return thin_pairs_.empty() ? full : thinned(thin_pairs_, {pair.first, pair.second, 0}, full);
+  }
+  double thicknessOf(const Candidates::OnSolid& on) const
+  {
+    const double full = surface_.segments[on.segment].radius;
+    return thin_on_solids_.empty() ? full : thinned(thin_on_solids_, {on.solid, on.segment, on.piece}, full);
+  }
+  bool passes(const Candidates::OnSolid& on) const { return held_.letPass(on.solid, false, on.segment); }
+  bool passes(const SheetCandidates::OnSolid& on) const
+  {
+    return on.face.driven != 0 && !surface_.solids[on.solid].body && held_.letPass(on.solid, true, on.face.index);
+  }
+  static std::array<int, 3> keyOf(const SheetCandidates::Pair& pair) { return {pair.edges, pair.first, pair.second}; }
+  static std::array<int, 3> keyOf(const SheetCandidates::OnSolid& on)
+  {
+    return {3 * on.solid + on.face.corners - 1, on.face.index, on.piece};
+  }
+  double thicknessOf(const SheetCandidates::Pair& pair) const
+  {
+    return thin_sheets_.empty() ? pair.thickness : thinned(thin_sheets_, keyOf(pair), pair.thickness);
+  }
+  double thicknessOf(const SheetCandidates::OnSolid& on) const
+  {
+    return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
+  }
+  double sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
+                     const std::vector<Pose>& solids, const std::vector<Pose>& solids_end) const;
+  double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
+
+  ContactSurface surface_;
+  ContactOptions options_;
+  Barrier barrier_;
+  std::vector<BarrierStiffness> stiffness_;   ///< per object
+  std::vector<SolidPieces> solids_;
+
+  double h_ = 0.0;
+  Eigen::Matrix3Xd x_begin_;
+  std::vector<Pose> solids_begin_;
+  std::vector<Contact> contacts_, lagged_;
+  std::vector<FrictionSpring> springs_;   ///< where the step begins; sorted
+  std::vector<ContactTerm> terms_;
+  std::vector<ContactRow> rows_;
+  double smallest_gap_ = 0.0;
+  bool following_ = false;   ///< see followFriction()
+
+  std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
+  std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
+  std::vector<PredictedForce> predicted_;   ///< if friction follows: one per contact, in their order
+  int follows_left_ = 0;                    ///< how often friction may still follow before the next begin()
+  /// The change that lagFriction() without prediction returned last, and the share of the change of each force that
+  /// the next call takes over.
+  double last_change_ = kInfinity, relaxation_ = 1.0;
+  double shift_ = 0.0;   ///< constant of the potential, see followFriction() [J]
+  Candidates near_, swept_;
+  SheetPieces sheets_;
+  HeldPieces held_;
+  std::vector<Displacements> displacements_;   ///< per object, see movedFar()
+  std::vector<int> segment_of_point_;          ///< begins at a point, or ends there if none begins; -1: none
+  double margin_;
+  std::vector<int> order_;   ///< for clearance()
+  std::vector<BoundingBox> boxes_;
+};
+
+}   // namespace slender
