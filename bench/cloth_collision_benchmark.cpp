@@ -6,7 +6,7 @@
 #include <fcl/fcl.h>
 
 #include "slender_sim/contact/broad_phase.h"
-#include "slender_sim/contact/impulses/surface_collider.h"
+#include "contact/impulses/surface_collider.h"
 #include "contact/kdop_tree.h"
 
 namespace {

@@ -49,7 +49,7 @@ if(BUILD_BENCHMARKS)
   target_include_directories(contact_benchmark PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(contact_benchmark PRIVATE slender_sim benchmark::benchmark fcl)
   add_executable(cloth_collision_benchmark ${PROJECT_SOURCE_DIR}/bench/cloth_collision_benchmark.cpp)
-  target_include_directories(cloth_collision_benchmark PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(cloth_collision_benchmark PRIVATE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(cloth_collision_benchmark PRIVATE slender_sim benchmark::benchmark fcl)
 endif()
 

@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "slender_sim/cloth/cloth_stepper.h"
-#include "slender_sim/contact/impulses/surface_collider.h"
+#include "contact/impulses/surface_collider.h"
 #include "slender_sim/dynamics/substep_controller.h"
 #include "world_object.h"
 

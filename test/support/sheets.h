@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "slender_sim/contact/intersection.h"
-#include "slender_sim/contact/impulses/surface_collider.h"
+#include "contact/impulses/surface_collider.h"
 
 namespace slender::test {
 

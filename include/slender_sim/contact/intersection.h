@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "slender_sim/contact/contact_surface.h"
-#include "slender_sim/contact/impulses/surface_collider.h"
+#include "slender_sim/contact/impulses/collision_surface.h"
 
 /// Intersections of triangles as they stand, decided exactly whatever the rounding, and without any search structure of
 /// the collision code: what studies and tests check results with.

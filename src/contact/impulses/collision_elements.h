@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "slender_sim/contact/impulses/surface_collider.h"
+#include "slender_sim/contact/impulses/collision_surface.h"
 
 namespace slender {
 

@@ -1,11 +1,9 @@
-#include "slender_sim/contact/impulses/surface_collider.h"
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <tuple>
 
-#include "surface_collider_impl.h"
+#include "surface_collider.h"
 #include "slender_sim/linalg/interruption.h"
 
 namespace slender {
@@ -21,7 +19,7 @@ constexpr long kLimitWork = 8;   // of a WorkBudget: when a pair meets
 
 }   // namespace
 
-bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int second)
+bool SurfaceCollider::fail(const std::string& reason, int first, int second)
 {
   report_.ok = false;
   report_.reason = reason;
@@ -30,15 +28,14 @@ bool SurfaceCollider::Impl::fail(const std::string& reason, int first, int secon
 }
 
 /// What was found so far is not all there is.
-bool SurfaceCollider::Impl::failSpent()
+bool SurfaceCollider::failSpent()
 {
   known_ = false;
   report_.spent = true;
   return fail("more work than a step is given");
 }
 
-bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v,
-                                 bool again)
+bool SurfaceCollider::load(const CollisionStep& step, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& v, bool again)
 {
   const int n = elements_.sheet_points;
   const std::size_t solids = elements_.objects.size() - elements_.sheet_count;
@@ -68,7 +65,7 @@ bool SurfaceCollider::Impl::load(const CollisionStep& step, const Eigen::Matrix3
 }
 
 /// Distance from which a pair repels: less than the shells where pieces of a sheet are close to each other at rest.
-double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
+double SurfaceCollider::reach(const CollisionPair& pair) const
 {
   const double shell = pairs_.shell(pair);
   return pairs_.object(pair, false) != pairs_.object(pair, true)
@@ -77,7 +74,7 @@ double SurfaceCollider::Impl::reach(const CollisionPair& pair) const
 }
 
 /// Appends a row of a pair that meets at this place. Its bound is set by the caller.
-CollisionRow& SurfaceCollider::Impl::addRow(const CollisionPair& pair, const PairPlace& place)
+CollisionRow& SurfaceCollider::addRow(const CollisionPair& pair, const PairPlace& place)
 {
   CollisionRow row{};
   row.normal = place.normal;
@@ -93,7 +90,7 @@ CollisionRow& SurfaceCollider::Impl::addRow(const CollisionPair& pair, const Pai
   return rows_.rows.back();
 }
 
-void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& place, double range)
+void SurfaceCollider::repel(const CollisionPair& pair, const PairPlace& place, double range)
 {
   CollisionRow& row = addRow(pair, place);
   row.push = push_ * std::max(0.0, range - pair.gap);
@@ -104,7 +101,7 @@ void SurfaceCollider::Impl::repel(const CollisionPair& pair, const PairPlace& pl
 
 /// Finds all pairs that may come near each other; those within their shells, or near them and about to enter, get
 /// repulsions.
-bool SurfaceCollider::Impl::examineStart()
+bool SurfaceCollider::examineStart()
 {
   const std::vector<CollisionPair>& pairs =
       known_ ? pairs_.update(from_, to_, *budget_) : pairs_.find(from_, to_, *budget_);
@@ -134,7 +131,7 @@ bool SurfaceCollider::Impl::examineStart()
   return true;
 }
 
-double SurfaceCollider::Impl::planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const
+double SurfaceCollider::planeGap(int plane, const std::vector<Pose>& poses, const Eigen::Vector3d& x) const
 {
   const Pose& pose = poses[elements_.planes[plane] - elements_.sheet_count];
   return (pose.orientation * Eigen::Vector3d::UnitZ()).dot(x - pose.position);
@@ -142,7 +139,7 @@ double SurfaceCollider::Impl::planeGap(int plane, const std::vector<Pose>& poses
 
 /// Whether a point comes too near a plane whose origin and normal go along straight lines: the gap is quadratic in
 /// time.
-bool SurfaceCollider::Impl::planeHit(int point, int plane) const
+bool SurfaceCollider::planeHit(int point, int plane) const
 {
   const int solid = elements_.planes[plane] - elements_.sheet_count;
   const Pose &p0 = step_->solids[solid], &p1 = step_->solids_end[solid];
@@ -157,7 +154,7 @@ bool SurfaceCollider::Impl::planeHit(int point, int plane) const
   return !(least > goal);
 }
 
-void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool hit)
+void SurfaceCollider::addPlaneRow(int point, int plane, double gap, bool hit)
 {
   const int object = elements_.planes[plane], solid = object - elements_.sheet_count,
             sheet = elements_.point_object[point];
@@ -176,7 +173,7 @@ void SurfaceCollider::Impl::addPlaneRow(int point, int plane, double gap, bool h
   ++(hit ? report_.impulses : report_.repulsions);
 }
 
-bool SurfaceCollider::Impl::examinePlanes()
+bool SurfaceCollider::examinePlanes()
 {
   for (std::size_t plane = 0; plane < elements_.planes.size(); ++plane)
     for (int i = 0; i < elements_.sheet_points; ++i)
@@ -197,7 +194,7 @@ bool SurfaceCollider::Impl::examinePlanes()
 
 /// Fills hits_ and plane_hits_: all collisions along the present motions. After the first time only pairs whose motion
 /// has changed need a look.
-void SurfaceCollider::Impl::detect()
+void SurfaceCollider::detect()
 {
   const bool first = report_.rounds++ == 0;
   for (Eigen::Index i = 0; i < to_.cols(); ++i)
@@ -228,7 +225,7 @@ void SurfaceCollider::Impl::detect()
   tested_ = to_;
 }
 
-ApproachLimit SurfaceCollider::Impl::limitOf(const CollisionPair& pair) const
+ApproachLimit SurfaceCollider::limitOf(const CollisionPair& pair) const
 {
   ApproachLimit limit;
   limit.thickness = pairs_.core(pair);
@@ -238,7 +235,7 @@ ApproachLimit SurfaceCollider::Impl::limitOf(const CollisionPair& pair) const
 }
 
 /// The end of the step has to stay on this side, seen where the pieces come too near each other.
-void SurfaceCollider::Impl::stop(const CollisionPair& pair)
+void SurfaceCollider::stop(const CollisionPair& pair)
 {
   const ApproachLimit limit = limitOf(pair);
   const double share = pairs_.limit(pair, from_, to_, limit), gap = std::min(pair.gap, limit.reach);
@@ -249,7 +246,7 @@ void SurfaceCollider::Impl::stop(const CollisionPair& pair)
 }
 
 /// Velocities at the end do not approach where pieces touch then, with friction.
-void SurfaceCollider::Impl::solveVelocities()
+void SurfaceCollider::solveVelocities()
 {
   const double h = step_->h;
   auto& rows = rows_.rows;
@@ -292,7 +289,7 @@ void SurfaceCollider::Impl::solveVelocities()
   }
 }
 
-void SurfaceCollider::Impl::takeHeldImpulses()
+void SurfaceCollider::takeHeldImpulses()
 {
   held_impulses_.setZero(3, elements_.sheet_points);
   for (const CollisionRow& row : rows_.rows)
@@ -301,7 +298,7 @@ void SurfaceCollider::Impl::takeHeldImpulses()
         held_impulses_.col(p) += row.weight[i] * (row.impulse * row.normal + row.rubbing);
 }
 
-void SurfaceCollider::Impl::addHits()
+void SurfaceCollider::addHits()
 {
   for (const CollisionPair& pair : hits_)
     stop(pair);
@@ -309,7 +306,7 @@ void SurfaceCollider::Impl::addHits()
     addPlaneRow(hit.point, hit.plane, planeGap(hit.plane, step_->solids, from_.col(hit.point)), true);
 }
 
-bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
+bool SurfaceCollider::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
 {
   push_ = 0.0;   // which moves pieces apart but causes no velocity
   const bool fine = load(step, x, step.x_start, again) && examineStart() && examinePlanes();
@@ -328,8 +325,8 @@ bool SurfaceCollider::Impl::approach(const CollisionStep& step, Eigen::Matrix3Xd
   return !budget_->spent() || failSpent();
 }
 
-CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v,
-                                               bool again)
+CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v,
+                                         bool again)
 {
   if (!load(step, x, v, again) || !examineStart() || !examinePlanes())
     return report_;
@@ -360,25 +357,6 @@ CollisionReport SurfaceCollider::Impl::resolve(const CollisionStep& step, Eigen:
   x = to_.leftCols(elements_.sheet_points);
   v = velocity_.leftCols(elements_.sheet_points);
   return report_;
-}
-
-SurfaceCollider::SurfaceCollider(const CollisionSurface& surface) : impl_(std::make_unique<Impl>(surface)) {}
-SurfaceCollider::~SurfaceCollider() = default;
-SurfaceCollider::SurfaceCollider(SurfaceCollider&&) noexcept = default;
-
-const Eigen::Matrix3Xd& SurfaceCollider::heldImpulses() const { return impl_->heldImpulses(); }
-bool SurfaceCollider::touched(int first, int count) const { return impl_->touched(first, count); }
-int SurfaceCollider::solidOf(int point) const { return impl_->solidOf(point); }
-
-CollisionReport SurfaceCollider::resolve(const CollisionStep& step, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v,
-                                         bool again)
-{
-  return impl_->resolve(step, x, v, again);
-}
-
-bool SurfaceCollider::approach(const CollisionStep& step, Eigen::Matrix3Xd& x, bool again)
-{
-  return impl_->approach(step, x, again);
 }
 
 }   // namespace slender

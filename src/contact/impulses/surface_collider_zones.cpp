@@ -4,12 +4,12 @@
 #include <Eigen/Geometry>
 
 #include "slender_sim/geometry/rotation.h"
-#include "surface_collider_impl.h"
+#include "surface_collider.h"
 
 namespace slender {
 
 /// Of a point in the zones: those of a solid are one.
-int SurfaceCollider::Impl::node(int point) const
+int SurfaceCollider::node(int point) const
 {
   return point < elements_.sheet_points
              ? point
@@ -17,7 +17,7 @@ int SurfaceCollider::Impl::node(int point) const
 }
 
 /// Returns whether zones grew. Collisions within a zone are none: see ImpactZones.
-bool SurfaceCollider::Impl::joinHits()
+bool SurfaceCollider::joinHits()
 {
   bool grown = false;
   const auto join = [&](int a, int b) {
@@ -33,7 +33,7 @@ bool SurfaceCollider::Impl::joinHits()
 }
 
 /// Moves a zone with what is prescribed in it, if that moves as one.
-bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
+bool SurfaceCollider::followPrescribed(const ImpactZones::Zone& zone)
 {
   const int points = static_cast<int>(from_.cols());
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
@@ -78,7 +78,7 @@ bool SurfaceCollider::Impl::followPrescribed(const ImpactZones::Zone& zone)
   return true;
 }
 
-bool SurfaceCollider::Impl::moveZones()
+bool SurfaceCollider::moveZones()
 {
   for (const ImpactZones::Zone& zone : zones_.zones(inverse_mass_))
   {
