@@ -12,35 +12,29 @@
 
 namespace slender {
 
-/// What steps a thread that touches nothing but its floor: an island of its own.
-class ThreadStepper::Alone
+/// A thread that touches nothing but its floor, and its island.
+struct ThreadStepper::Alone : ThreadWork
 {
-public:
-  explicit Alone(ThreadWork& thread) : part_(thread), island_(timeOf(thread), false)
+  Alone(std::shared_ptr<const ThreadModel> m, const NewtonConfig& n, Integrator integrator)
+    : ThreadWork(std::move(m), n, integrator == Integrator::symplectic_euler),
+      part(*this),
+      island(timeOf(n, integrator), false)
   {
-    island_.equations().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
-    island_.setParts({&part_});
+    island.equations().tolerances.most_unbalanced = ThreadSystem::mostUnbalanced();
+    island.setParts({&part});
   }
 
-  /// From what the thread has loaded.
-  StepReport step()
-  {
-    double first = 0.0;
-    return island_.step(part_.thread().duration, first);
-  }
-
-private:
-  static TimeConfig timeOf(const ThreadWork& thread)
+  static TimeConfig timeOf(const NewtonConfig& newton, Integrator integrator)
   {
     TimeConfig time;
-    time.integrator = thread.explicit_step ? Integrator::symplectic_euler : Integrator::implicit_euler;
+    time.integrator = integrator;
     time.error_tolerance = time.min_step = 0.0;
-    time.newton = thread.newton;
+    time.newton = newton;
     return time;
   }
 
-  ThreadPart part_;
-  Island island_;
+  ThreadPart part;
+  Island island;
 };
 
 namespace {
@@ -69,8 +63,7 @@ ThreadStepper::ThreadStepper(std::shared_ptr<const ThreadModel> model, const New
   if (integrator != Integrator::implicit_euler && integrator != Integrator::symplectic_euler)
     throw std::invalid_argument("thread '" + model->name + "': integrator is " + toString(integrator) +
                                 ", allowed: implicit_euler, symplectic_euler");
-  work_ = std::make_unique<ThreadWork>(std::move(model), newton, integrator == Integrator::symplectic_euler);
-  alone_ = std::make_unique<Alone>(*work_);
+  alone_ = std::make_unique<Alone>(std::move(model), newton, integrator);
 }
 ThreadStepper::~ThreadStepper() = default;
 ThreadStepper::ThreadStepper(ThreadStepper&&) noexcept = default;
@@ -79,16 +72,17 @@ ThreadStepper& ThreadStepper::operator=(ThreadStepper&&) noexcept = default;
 StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, double duration)
 {
   StepReport report;
-  if (!work_->accepts(state, inputs, duration, report))
+  if (!alone_->accepts(state, inputs, duration, report))
     return report;
-  work_->begin(state, inputs, duration);
-  report = alone_->step();
+  alone_->begin(state, inputs, duration);
+  double first = 0.0;
+  report = alone_->island.step(duration, first);
   if (report.ok)
-    std::swap(state, work_->work);
+    std::swap(state, alone_->work);
   return report;
 }
-const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return work_->loads; }
-const ThreadModel& ThreadStepper::model() const { return *work_->model; }
+const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return alone_->loads; }
+const ThreadModel& ThreadStepper::model() const { return *alone_->model; }
 
 bool ThreadWork::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration,
                               std::string& what) const

@@ -26,8 +26,6 @@ struct EndLoad
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
 };
 
-class ThreadWork;
-
 /// Advances one viscous thread (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains those at
 /// the start of the step. implicit_euler for use; symplectic_euler, stable only for steps of about rho l^2 / (6 mu) at
 /// the shortest edge l, for comparison.
@@ -50,8 +48,7 @@ public:
   const ThreadModel& model() const;
 
 private:
-  class Alone;
-  std::unique_ptr<ThreadWork> work_;
+  struct Alone;
   std::unique_ptr<Alone> alone_;
 };
 
