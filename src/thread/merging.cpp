@@ -41,11 +41,27 @@ double mergingWork(double r, double d0, double d)
   return 0.5 * (b - a) / kParts * sum;
 }
 
-void MergingPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
-                             const std::vector<MergingFluid>& fluids, const std::vector<GridPairs::Pair>& pairs,
-                             const std::vector<char>& held, double gap, double h)
+void ThreadMerging::begin(const Eigen::Matrix3Xd& x, const ContactSurface& surface,
+                          const std::vector<GridPairs::Pair>& pairs, double gap, double h)
 {
-  clear();
+  fluids_.assign(surface.objects.size() - parts_.size(), {});
+  held_.assign(static_cast<std::size_t>(surface.points), 0);
+  for (const ThreadPart* part : parts_)
+  {
+    const ThreadModel& model = *part->thread().model;
+    fluids_.push_back({part->merging() > 0.0, model.surface_tension, model.viscosity});
+    for (int i = 0; i < part->points(); ++i)
+      held_[static_cast<std::size_t>(part->first_point + i)] = part->thread().isHeld(i);
+  }
+  begin(x, surface.segments, fluids_, pairs, held_, gap, h);
+}
+
+void ThreadMerging::begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
+                          const std::vector<MergingFluid>& fluids, const std::vector<GridPairs::Pair>& pairs,
+                          const std::vector<char>& held, double gap, double h)
+{
+  places_.clear();
+  terms_.clear();
   const auto isLast = [&](int j) {
     return j + 1 == static_cast<int>(segments.size()) || segments[j + 1].object != segments[j].object;
   };
@@ -71,9 +87,9 @@ void MergingPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Contac
 
 /// Node a of segment `own` (b with far_end) and segment `other`, if that holds the place of its strand that is nearest
 /// around there.
-void MergingPotential::meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
-                            const std::vector<MergingFluid>& fluids, int own, bool far_end, int other, double gap,
-                            double h)
+void ThreadMerging::meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
+                         const std::vector<MergingFluid>& fluids, int own, bool far_end, int other, double gap,
+                         double h)
 {
   const ContactSegment &s = segments[own], &o = segments[other];
   const int point = far_end ? s.b : s.a, count = static_cast<int>(segments.size());
@@ -125,7 +141,7 @@ void MergingPotential::meet(const Eigen::Matrix3Xd& x, const std::vector<Contact
   places_.push_back(place);
 }
 
-double MergingPotential::largestAttraction() const
+double ThreadMerging::largestForce() const
 {
   double largest = 0.0;
   for (const Place& place : places_)
@@ -133,7 +149,7 @@ double MergingPotential::largestAttraction() const
   return largest;
 }
 
-double MergingPotential::evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness)
+double ThreadMerging::evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness)
 {
   terms_.clear();
   double energy = 0.0;

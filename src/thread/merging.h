@@ -2,7 +2,8 @@
 
 #include <vector>
 
-#include "island/equations.h"
+#include "island/island.h"
+#include "thread_part.h"
 
 namespace slender {
 
@@ -13,7 +14,8 @@ struct MergingFluid
   double surface_tension = 0.0, viscosity = 0.0;   ///< [N/m], [Pa s]
 };
 
-/// Merging of threads that graze (thesis 5.4.3), per pair of balls of radius r = (r1 + r2)/2 at a distance d
+/// Merging of the threads of an island that graze (thesis 5.4.3), per pair of balls of radius r = (r1 + r2)/2 at a
+/// distance d
 ///
 ///   F = 2 pi gamma r - mu (4 pi/3) rho |d'|,   rho^2 = r^2 - d^2/4,
 ///
@@ -25,23 +27,22 @@ struct MergingFluid
 ///   W(d) = 2 pi gamma r d + (4 pi mu / 3 h) int_d0^d rho(s) (s - d0) ds,
 ///
 /// convex for all d < d0. The attraction sets in over the gap of the contact.
-class MergingPotential : public SurfacePotential
+class ThreadMerging : public SubstepPotential
 {
 public:
-  /// Finds what merges in a step of h seconds. `radii`, of the segments as they are; `pairs` of segments near each
-  /// other; `held`, per point.
+  /// The threads. Their objects come behind all others.
+  void setParts(const std::vector<ThreadPart*>& parts) { parts_ = parts; }
+  void begin(const Eigen::Matrix3Xd& x, const ContactSurface& surface, const std::vector<GridPairs::Pair>& pairs,
+             double gap, double h) override;
+  /// Finds what merges in a step of h seconds. `pairs`: segments that are near each other; `fluids`: per object;
+  /// `held`: per point.
   void begin(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
              const std::vector<MergingFluid>& fluids, const std::vector<GridPairs::Pair>& pairs,
              const std::vector<char>& held, double gap, double h);
-  void clear()
-  {
-    places_.clear();
-    terms_.clear();
-  }
   /// Potential [J] and terms(), as ContactPotential::evaluate().
   double evaluate(const Eigen::Matrix3Xd& x, bool with_stiffness) override;
   const std::vector<ContactTerm>& terms() const override { return terms_; }
-  double largestAttraction() const;   ///< of a place [N]
+  double largestForce() const override;
 
 private:
   struct Place
@@ -55,6 +56,9 @@ private:
   void meet(const Eigen::Matrix3Xd& x, const std::vector<ContactSegment>& segments,
             const std::vector<MergingFluid>& fluids, int own, bool far_end, int other, double gap, double h);
 
+  std::vector<ThreadPart*> parts_;
+  std::vector<MergingFluid> fluids_;   ///< per object
+  std::vector<char> held_;             ///< per point
   std::vector<Place> places_;
   std::vector<ContactTerm> terms_;
 };

@@ -3,9 +3,9 @@
 #include <vector>
 
 #include "island/island.h"
+#include "thread/merging.h"
 #include "thread/thread_guard.h"
 #include "world_objects.h"
-#include "thread_merging.h"
 
 namespace slender {
 

@@ -86,7 +86,7 @@ TEST(Merging, GradientAndStiffnessMatchDifferences)
   for (int i = 0; i < n - 1; ++i)
     for (int j = n - 1; j < 2 * (n - 1); ++j)
       pairs.push_back({i, j});
-  MergingPotential merging;
+  ThreadMerging merging;
   merging.begin(x, segments, {{true, 0.3, 2.0}, {true, 0.5, 1.0}}, pairs, std::vector<char>(2 * n, 0), 0.05, 0.1);
   for (int i = 0; i < 2 * n; ++i)
     x.col(i) += Vector3d(0, i < n ? 0.05 : -0.05, 0) + random.vector(0.02);
