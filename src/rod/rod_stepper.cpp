@@ -13,27 +13,22 @@
 namespace slender {
 
 /// What steps a rod that nothing else meets, and finds its equilibria.
-class RodStepper::Alone
+struct RodStepper::Alone
 {
-public:
-  explicit Alone(RodWork& rod) : rod_(rod), part_(rod, false), island_(rod.time, false)
+  explicit Alone(RodWork& own) : rod(own), part(rod, false), island(rod.time, false)
   {
-    island_.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
-    island_.setParts({&part_});
-    statics_.setParts(island_.equations(), {&part_}, rod.time.newton);
+    island.equations().tolerances.angles_may_keep_shift = RodSystem::anglesMayKeepShift();
+    island.setParts({&part});
+    statics.setParts(island.equations(), {&part}, rod.time.newton);
   }
 
-  /// From what the rod has loaded.
-  StepReport step() { return island_.step(rod_.duration, rod_.work.next_step); }
   /// Searches for an equilibrium from `state`. Without `search` it only tells whether `state` is stable.
   StepReport equilibrium(RodState& state, const RodInputs& inputs, bool search, bool leave_saddles);
-  const Eigen::VectorXd& lowestMode() const { return statics_.mode(); }
 
-private:
-  RodWork& rod_;
-  RodPart part_;
-  Island island_;
-  Statics statics_;
+  RodWork& rod;
+  RodPart part;
+  Island island;
+  Statics statics;
 };
 
 StepReport RodStepper::Alone::equilibrium(RodState& state, const RodInputs& inputs, bool search, bool leave_saddles)
@@ -46,24 +41,24 @@ StepReport RodStepper::Alone::equilibrium(RodState& state, const RodInputs& inpu
     g.velocity.reset();
   for (GraspState& g : start.grasps)
     g.velocity = Twist{};
-  rod_.begin(start, loads, 1.0);
-  addFrames(*rod_.model, rod_.work);
-  rod_.system.load(rod_.work);
-  rod_.system.setTwistLoads(loads.torques);
-  const StepFailure failure = statics_.solve(search, leave_saddles);
-  StepReport report = statics_.report();
+  rod.begin(start, loads, 1.0);
+  addFrames(*rod.model, rod.work);
+  rod.system.load(rod.work);
+  rod.system.setTwistLoads(loads.torques);
+  const StepFailure failure = statics.solve(search, leave_saddles);
+  StepReport report = statics.report();
   if (failure == StepFailure::newton_diverged && !(report.residual < kMostUnbalanced))
-    return rod_.refuse(report, failure,
-                       "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
-                       "grasp, or let it move by time stepping (start: as_given)");
+    return rod.refuse(report, failure,
+                      "no equilibrium was found: nothing balances the loads, so that the rod drifts: hold it by a "
+                      "grasp, or let it move by time stepping (start: as_given)");
   if (failure != StepFailure::none)
-    return rod_.refuse(report, failure, explainStatics(failure));
-  rod_.computeWrenches(0.0);
+    return rod.refuse(report, failure, explainStatics(failure));
+  rod.computeWrenches(0.0);
   for (std::size_t k = 0; k < start.grasps.size(); ++k)
-    if (rod_.work.grasps[k].active)
-      rod_.work.grasps[k].X_WG = {loads.grasps[k].X_WG.position, loads.grasps[k].X_WG.orientation.normalized()};
+    if (rod.work.grasps[k].active)
+      rod.work.grasps[k].X_WG = {loads.grasps[k].X_WG.position, loads.grasps[k].X_WG.orientation.normalized()};
   if (search)
-    state = rod_.work;
+    state = rod.work;
   return report;
 }
 
@@ -95,7 +90,7 @@ StepReport RodStepper::step(RodState& state, const RodInputs& inputs, double dur
   if (!accepts(state, inputs, report))
     return report;
   work_->begin(state, inputs, duration);
-  report = alone_->step();
+  report = alone_->island.step(duration, work_->work.next_step);
   if (report.ok)
     state = work_->work;
   return report;
@@ -115,7 +110,7 @@ Eigen::Map<const Eigen::Matrix4Xd> RodStepper::lowestMode() const
 {
   if (!alone_)
     return {nullptr, 4, 0};
-  const Eigen::VectorXd& mode = alone_->lowestMode();
+  const Eigen::VectorXd& mode = alone_->statics.mode();
   return {mode.data(), 4, mode.size() / 4};
 }
 const std::vector<Wrench>& RodStepper::wrenches() const { return work_->wrenches; }

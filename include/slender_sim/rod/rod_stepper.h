@@ -75,7 +75,7 @@ public:
   RodWork& work() { return *work_; }
 
 private:
-  class Alone;
+  struct Alone;
   bool accepts(const RodState& state, const RodInputs& inputs, StepReport& report);
 
   std::unique_ptr<RodWork> work_;
