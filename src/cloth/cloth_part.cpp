@@ -284,8 +284,10 @@ double ClothPart::inertiaShift(const HessianShift& shift) const
   return exact_ ? (coupled || indefinite_ ? kShiftOfAngle * shift.angle : 0.0) : shift.position;
 }
 
-/// A stiffness between points of one triangle. The blocks of the membrane have room for it.
-void ClothPart::addToBlocks(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness)
+/// A stiffness between points of one triangle. The blocks of the membrane, in which rows belong to the later point,
+/// have room for it.
+template <class Block>
+void ClothPart::addToBlocks(const int (&point)[4], Block&& block)
 {
   BlockMatrix& matrix = system().matrix();
   for (int p = 0; p < 4; ++p)
@@ -293,7 +295,7 @@ void ClothPart::addToBlocks(const int (&point)[4], const double (&weight)[4], co
       if (point[p] >= 0 && point[q] >= 0)
         Eigen::Map<Eigen::Matrix3d>(matrix.values() + 9 * static_cast<std::size_t>(matrix.block(
                                                               point[p] - first_point, point[q] - first_point))) +=
-            weight[p] * weight[q] * stiffness;
+            point[p] < point[q] ? block(q, p) : block(p, q);
 }
 
 /// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the blocks.
@@ -303,13 +305,13 @@ void ClothPart::addOwnContacts(bool with_hessian)
   {
     for (int p = 0; p < 4; ++p)
       if (term->point[p] >= 0)
-        addForce(term->point[p] - first_point, term->weight[p] * term->force);
+        addForce(term->point[p] - first_point, term->share(p, term->force));
     if (with_hessian)
-      addToBlocks(term->point, term->weight, term->stiffness);
+      addToBlocks(term->point, [&](int i, int j) { return term->block(i, j, term->stiffness); });
   }
   for (const ContactRow* row : own_rows)
     if (with_hessian)
-      addToBlocks(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
+      addToBlocks(row->point, [&](int i, int j) { return row->block(i, j); });
 }
 
 /// Conjugate gradients find out only while they solve whether a matrix is definite, so that they solve here. A

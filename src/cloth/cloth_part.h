@@ -139,7 +139,8 @@ private:
   ClothSystem& system() const { return *work_.system; }
   bool isFree(int i) const { return number_[i] >= 0; }
   double inertiaShift(const HessianShift& shift) const;
-  void addToBlocks(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness);
+  template <class Block>
+  void addToBlocks(const int (&point)[4], Block&& block);
   void addOwnContacts(bool with_hessian);
   void factor(const HessianShift& shift);
   void allocate();

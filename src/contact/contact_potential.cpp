@@ -159,6 +159,7 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
   restart();
   if (!x.allFinite())
     return kInfinity;
+  x_now_ = x;
   if (!near_.holdsFor(x, poses))
     near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, options_.gap, margin_, kTurnMargin);
   double energy = 0.0;

@@ -20,6 +20,9 @@ namespace slender {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTurnMargin = 0.02;   ///< [rad] a solid may turn before candidates are sought again
 
+/// Returns the component of u across the normal n.
+inline Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Vector3d& u) { return u - n.dot(u) * n; }
+
 template <class To, class From>
 void copyFour(To& to, const From& from)
 {
@@ -161,8 +164,11 @@ private:
     double friction = 0.0;             ///< of the two, once the contact is lagged
     /// Of its spring: force where the step begins, and in the last evaluation.
     Eigen::Vector3d tension_begin = Eigen::Vector3d::Zero(), tension = Eigen::Vector3d::Zero();
-    Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< the position in the frame of the carrier, if there is one
-    std::array<ContactTerm::Turn, 2> turn{};         ///< of friction
+    Eigen::Vector3d own = Eigen::Vector3d::Zero();     ///< the position in the frame of the carrier, if there is one
+    int first_points = 2;                              ///< how many of the points belong to the first piece
+    std::array<ContactTerm::Turn, 2> turn{};           ///< of friction
+    bool levers = false;                               ///< whether any lever is not zero
+    Eigen::Vector3d lever[4] = {own, own, own, own};   ///< of friction, see ContactTerm
     /// Slip, force over the largest one, and its derivative at the iterate before. None before the first one.
     bool has_iterate = false;
     Eigen::Vector3d last_slip = Eigen::Vector3d::Zero(), last_force = Eigen::Vector3d::Zero();
@@ -205,6 +211,12 @@ private:
   /// `scale`: of the gap at which the pair repels.
   double addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
   void setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const;
+  /// Whether friction turns the first and the second piece, which are curves then.
+  std::array<bool, 2> turnsOf(const Contact& contact) const
+  {
+    return {surface_.objects[contact.object].turns, contact.other >= 0 && surface_.objects[contact.other].turns};
+  }
+  void setLevers(Contact& contact) const;
   void listSegments();
   /// Appends a term of a contact, without its force.
   ContactTerm& addTerm(const Contact& contact);
@@ -290,7 +302,7 @@ private:
   std::vector<SolidPieces> solids_;
 
   double h_ = 0.0;
-  Eigen::Matrix3Xd x_begin_;
+  Eigen::Matrix3Xd x_begin_, x_now_;   ///< where the step begins; in the last evaluation
   std::vector<Pose> solids_begin_;
   std::vector<Contact> contacts_, lagged_;
   std::vector<FrictionSpring> springs_;   ///< where the step begins; sorted

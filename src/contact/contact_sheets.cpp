@@ -50,6 +50,7 @@ double ContactPotential::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCand
     contact.point[0] = p.point;
     std::copy(t.corner.begin(), t.corner.end(), contact.point + 1);
     gap = pointTriangleGap(at(0), at(1), at(2), at(3), thickness);
+    contact.first_points = 1;
     object = p.object;
     other = t.object;
     radius = thickness * t.half_thickness / (p.radius + t.half_thickness);
@@ -95,6 +96,7 @@ double ContactPotential::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetC
   contact.second = (static_cast<std::int64_t>(face.index) << 32) + on.piece;
   std::copy(face.corner.begin(), face.corner.end(), contact.point);
   contact.point[3] = -1;
+  contact.first_points = face.corners;
   contact.solid = on.solid;
   contact.material = -(gap.gap / gap.weight + radius) * gap.normal;
   for (int k = 0; k < face.corners; ++k)

@@ -10,9 +10,6 @@ namespace slender {
 
 namespace {
 
-/// Returns the component of u across the normal n.
-Eigen::Vector3d across(const Eigen::Vector3d& n, const Eigen::Vector3d& u) { return u - n.dot(u) * n; }
-
 /// Returns the stretch of a spring that exerts `tension`, which was across another normal, turned across n. `most`: the
 /// largest force [N].
 Eigen::Vector3d stretchOf(const Eigen::Vector3d& tension, const Eigen::Vector3d& n, double most,
@@ -55,30 +52,6 @@ double ContactPotential::frictionOf(const Contact& contact) const
   return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
-/// Finds how friction turns the curves of a contact. The lever reaches from the centreline to the place where the force
-/// acts. If a curve touches a solid or another curve, that place is on the surface of the curve. If it touches a cloth,
-/// the place is on the middle surface of the cloth, so that the moments on both are opposite.
-void ContactPotential::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
-{
-  const bool turns[2] = {surface_.objects[contact.object].turns,
-                         contact.other >= 0 && surface_.objects[contact.other].turns};
-  if (!turns[0] && !turns[1])
-    return;
-  Eigen::Vector3d middle[2] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  for (int k = 0; k < 4; ++k)
-    if (contact.point[k] >= 0)
-      middle[contact.weight[k] < 0.0] += std::abs(contact.weight[k]) * x.col(contact.point[k]);
-  const bool on_sheet = contact.solid < 0 && turns[0] != turns[1];
-  const Eigen::Vector3d place = on_sheet ? middle[turns[0]] : contact.position;
-  for (int side = 0; side < 2; ++side)
-    if (turns[side])
-    {
-      const ContactSegment& s = surface_.segments[segment_of_point_[contact.point[2 * side]]];
-      const Eigen::Vector3d tangent = (x.col(s.b) - x.col(s.a)).normalized();
-      contact.turn[side] = {s.a, (side == 0 ? 1.0 : -1.0) * tangent.cross(place - middle[side])};
-    }
-}
-
 double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
                                      const Eigen::VectorXd* turns, Contact& contact, bool with_stiffness)
 {
@@ -91,9 +64,15 @@ double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vecto
   term.carried = carrier >= 0;
   if (term.carried)
     u = poses[carrier] * contact.own - solids_begin_[carrier] * contact.own;
+  const Eigen::Vector3d n = contact.force / normal_force;
+  if (contact.levers)
+  {
+    term.normal = n;
+    copyFour(term.lever, contact.lever);
+  }
   for (int i = 0; i < 4 && !term.carried; ++i)
     if (contact.point[i] >= 0)
-      u += contact.weight[i] * (x.col(contact.point[i]) - x_begin_.col(contact.point[i]));
+      u += term.moveBy(i, x.col(contact.point[i]) - x_begin_.col(contact.point[i]));
   if (contact.solid >= 0)
   {
     term.position = poses[contact.solid] * contact.material;
@@ -104,7 +83,6 @@ double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vecto
     if (turns && turn.point >= 0)
       u += (*turns)[turn.point] * turn.column;
   const SmoothedCoulomb law{options_.slip_speed * h_};
-  const Eigen::Vector3d n = contact.force / normal_force;
   Eigen::Vector3d tension = contact.tension_begin;
   if (const double angle = turnsWithSolid(contact) ? spin(contact, poses) : 0.0; angle != 0.0)
     tension = Eigen::AngleAxisd(angle, n) * tension;
@@ -246,6 +224,8 @@ double ContactPotential::lagFriction(double least, bool predicted)
       if (spring != springs_.end() && !(wanted < *spring))
         contact.tension = contact.tension_begin = spring->tension;
     }
+    if (!same || !predicted)
+      setLevers(contact);
   }
   for (; old != lagged_.end(); ++old)
     change = std::max(change, old->force.norm());

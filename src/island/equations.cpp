@@ -291,7 +291,7 @@ void Equations::measureContacts()
     Eigen::Vector3d u = Eigen::Vector3d::Zero();
     for (int p = 0; p < 4 && !term.carried; ++p)
       if (term.point[p] >= 0)
-        u += term.weight[p] * partOf(term.point[p]).move(term.point[p] - partOf(term.point[p]).first_point);
+        u += term.moveBy(p, partOf(term.point[p]).move(term.point[p] - partOf(term.point[p]).first_point));
     if (term.carried)
       u = carrierOf(term).moveAt(term.position);
     if (const RigidPart* body = bodyOf(term.solid))

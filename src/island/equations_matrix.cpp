@@ -66,7 +66,7 @@ void Equations::addForce(const ContactTerm& term)
     if (term.point[p] >= 0)
     {
       Part& part = partOf(term.point[p]);
-      part.addForce(term.point[p] - part.first_point, term.weight[p] * term.force);
+      part.addForce(term.point[p] - part.first_point, term.share(p, term.force));
     }
   if (term.carried)
     carrierOf(term).addForceAt(term.position, term.force);
@@ -120,7 +120,10 @@ void Equations::columnsOf(const ContactTerm& term, std::array<Part::Columns, 3>&
       if (term.point[p] >= 0)
       {
         const Part& part = partOf(term.point[p]);
-        part.addColumns(term.point[p] - part.first_point, c, term.weight[p], rows[c]);
+        const Eigen::Vector3d weights = term.share(p, Eigen::Vector3d::Unit(c));
+        for (int k = 0; k < 3; ++k)
+          if (k == c || weights[k] != 0.0)
+            part.addColumns(term.point[p] - part.first_point, k, weights[k], rows[c]);
       }
     if (const RigidPart* body = bodyOf(term.solid))
       body->addColumnsAt(term.position, c, -1.0, rows[c]);

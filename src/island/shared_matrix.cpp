@@ -350,7 +350,7 @@ void SharedMatrix::addTerm(const ContactTerm& term, const ContactRow* rows, int 
     for (int k = 0; k < 4; ++k)
       moves[n][k] = rows[n].along[k] * rows[n].normal + (whole ? rows[n].across[k] : 0.0) * rows[n].turning;
   addBlocks(bases, [&](int i, int j) {
-    Eigen::Matrix3d block = term.weight[i] * term.weight[j] * stiffness;
+    Eigen::Matrix3d block = term.block(i, j, stiffness);
     for (int n = 0; n < count; ++n)
       block += rows[n].stiffness * moves[n][i] * moves[n][j].transpose();
     return block;
@@ -362,7 +362,7 @@ void SharedMatrix::addTurningTerm(const ContactTerm& term, const Bases& bases, c
   MergedRows merged;
   for (int p = 0; p < 4; ++p)
     for (int c = 0; c < 3 && bases[p] >= 0; ++c)
-      merged.place(bases[p] + c)[c] += term.weight[p];
+      merged.place(bases[p] + c) += term.moveBy(p, Eigen::Vector3d::Unit(c));
   for (int k = 0; k < 2; ++k)
     if (turns[k] >= 0)
       merged.place(turns[k]) += term.turn[k].column;

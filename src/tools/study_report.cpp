@@ -42,7 +42,7 @@ const std::vector<Plan>& plans()
       {"Error against run time",
        "Each problem once, every way to solve it: integrators, steps, resolutions, tolerances; against one converged "
        "run.",
-       {"swing", "thread_accuracy", "cloth_accuracy", "tracking_methods"},
+       {"swing", "thread_accuracy", "cloth_accuracy", "cloth_contact", "tracking_methods"},
        {"cantilever", "rods_at_rest", "peer_cases", "projection"}},
       {"Stability",
        "Stiff and extreme cases. Done, done with cut steps, or refused with a reason; never NaN, a crash or silently "

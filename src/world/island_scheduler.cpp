@@ -71,7 +71,7 @@ void IslandScheduler::addContactForces(const WorldObject& object, const Part& pa
     for (const ContactTerm& term : island->contact()->terms())
       for (int k = 0; k < 4; ++k)
         if (const int point = term.point[k] - part.first_point; term.point[k] >= 0 && point >= 0 && point < points)
-          forces.col(point) += term.weight[k] * term.force;
+          forces.col(point) += term.share(k, term.force);
   }
 }
 

@@ -62,7 +62,7 @@ inline Eigen::Matrix3Xd gradient(const ContactPotential& potential, Eigen::Index
   for (const ContactTerm& term : potential.terms())
     for (int i = 0; i < 4; ++i)
       if (term.point[i] >= 0)
-        g.col(term.point[i]) -= term.weight[i] * term.force;
+        g.col(term.point[i]) -= term.share(i, term.force);
   return g;
 }
 
@@ -77,7 +77,7 @@ inline Eigen::MatrixXd hessian(const ContactPotential& potential, Eigen::Index p
         if (term.point[i] >= 0 && term.point[j] >= 0)
         {
           auto block = h.block<3, 3>(3 * term.point[i], 3 * term.point[j]);
-          block += term.weight[i] * term.weight[j] * term.stiffness;
+          block += term.block(i, j, term.stiffness);
           if (whole)
             block += term.weight[i] * term.weight[j] * term.geometric;
         }

@@ -50,7 +50,7 @@ struct PartDriver
     for (const ContactTerm* term : part.own_terms)
       for (int p = 0; p < 4; ++p)
         if (term->point[p] >= 0)
-          part.addForce(term->point[p] - part.first_point, term->weight[p] * term->force);
+          part.addForce(term->point[p] - part.first_point, term->share(p, term->force));
     RodEvaluation e = part.evaluation;
     if (with_hessian)
       e.inertia.negative = !matrix.factorExactly([&](bool) {

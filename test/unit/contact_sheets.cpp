@@ -446,5 +446,64 @@ TEST(ContactSheets, FrictionSticksAndSlips)
   }
 }
 
+/// Friction acts on surfaces: what two pieces exert on each other has no moment, though their middle surfaces are
+/// apart. Nearly parallel edges cannot take the moment about themselves, and levers have a limit: these are left out.
+TEST(ContactSheets, FrictionHasNoMoment)
+{
+  constexpr double kStep = 0.01, kMove = 1e-9;            // [s], [m] far less than the range in which friction sticks
+  constexpr double kLargest = 0.299, kLeastSine = 0.25;   // of a lever, and of the angle of edges: there levers end
+  constexpr double kClosest = 1e-6 * kSheetThickness;   // [m] a lever, as the points have moved when the force is found
+  Random random(8);
+  int pairs = 0, on_solids = 0;
+  for (int k = 0; k < 120; ++k)
+  {
+    SheetCase c = k % 2 ? triangleOnSolid(random, shapes()[1 + k / 2 % 6], 0, true) : twoTriangles(random, k / 2 % 7);
+    if (k % 2 && !c.bring(3, random.direction()))
+      continue;
+    for (ContactObject& object : c.surface.objects)
+      object.friction = 0.5;
+    ContactPotential p = c.potential();
+    if (!std::isfinite(p.evaluate(c.x, c.solids, false)))
+      continue;
+    const std::size_t normals = p.terms().size();
+    p.begin(c.x, c.solids, kStep);
+    Eigen::Matrix3Xd there = c.x;
+    for (Eigen::Index i = 0; i < there.cols(); ++i)
+      there.col(i) += kMove * random.direction();
+    p.evaluate(there, c.solids, false);
+    for (std::size_t n = normals; n < p.terms().size(); ++n)
+    {
+      const ContactTerm& term = p.terms()[n];
+      const auto edge = [&](int i) -> Vector {
+        return (c.x.col(term.point[i + 1]) - c.x.col(term.point[i])).normalized();
+      };
+      const bool edges = term.solid < 0 && term.weight[1] >= 0.0;
+      double lever = 0.0;
+      for (const Vector& each : term.lever)
+        lever = std::max(lever, each.norm());
+      if (lever > kLargest || (edges && edge(0).cross(edge(2)).norm() < kLeastSine))
+        continue;
+      Vector force = Vector::Zero(), moment = Vector::Zero();
+      for (int i = 0; i < 4; ++i)
+        if (term.point[i] >= 0)
+        {
+          force += term.share(i, term.force);
+          moment += c.x.col(term.point[i]).cross(term.share(i, term.force));
+        }
+      if (term.solid >= 0)
+      {
+        force -= term.force;
+        moment -= term.position.cross(term.force);
+      }
+      const double size = term.force.norm();
+      EXPECT_NEAR(force.norm(), 0.0, 1e-13 * size);
+      EXPECT_NEAR(moment.norm(), 0.0, kClosest * size) << "case " << k;
+      ++(term.solid < 0 ? pairs : on_solids);
+    }
+  }
+  EXPECT_GT(pairs, 30);
+  EXPECT_GT(on_solids, 50);
+}
+
 }   // namespace
 }   // namespace slender::test
