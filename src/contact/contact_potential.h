@@ -211,11 +211,6 @@ private:
   /// `scale`: of the gap at which the pair repels.
   double addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
   void setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const;
-  /// Whether friction turns the first and the second piece, which are curves then.
-  std::array<bool, 2> turnsOf(const Contact& contact) const
-  {
-    return {surface_.objects[contact.object].turns, contact.other >= 0 && surface_.objects[contact.other].turns};
-  }
   void setLevers(Contact& contact) const;
   void listSegments();
   /// Appends a term of a contact, without its force.

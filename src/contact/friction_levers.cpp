@@ -37,7 +37,8 @@ struct DualVectors
 /// the place is on the middle surface of the cloth, so that the moments on both are opposite.
 void ContactPotential::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const
 {
-  const std::array<bool, 2> turns = turnsOf(contact);
+  const bool turns[2] = {surface_.objects[contact.object].turns,
+                         contact.other >= 0 && surface_.objects[contact.other].turns};
   if (!turns[0] && !turns[1])
     return;
   Vector middle[2] = {Vector::Zero(), Vector::Zero()};
@@ -58,12 +59,14 @@ void ContactPotential::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) con
 /// Finds the levers of a contact of cloth, so that for every force f across the normal n the moment of the forces on
 /// the points, the sum of x_k x (weight_k f + (lever_k . f) n), is that of a force f on the place where the other
 /// surface feels -f. A single corner on a plane has none. Curves have none either: the force along a fine curve would
-/// make normal forces as large as itself, which friction feeds on.
+/// make normal forces as large as itself, from which friction would grow again.
 void ContactPotential::setLevers(Contact& contact) const
 {
   constexpr double kLargest = 0.3;   // for the same reason: of cloth whose edges are shorter than a few thicknesses
-  const std::array<bool, 2> turns = turnsOf(contact);
-  if (surface_.objects[contact.object].carrier >= 0 || turns[0] || turns[1])
+  const auto isSheet = [&](int number) {
+    return surface_.objects[number].curve_length == 0.0 && surface_.objects[number].carrier < 0;
+  };
+  if (!isSheet(contact.object) || (contact.other >= 0 && !isSheet(contact.other)))
     return;
   const Vector n = contact.force.normalized();
   double apart = contact.solid < 0 ? 0.0 : -n.dot(contact.position);   // of the points' places

@@ -22,47 +22,32 @@ void ChainPart::retreat(double share)
     }
 }
 
-/// Adds a stiffness between a node and the next one to the panels, by its blocks of 3 x 3. The panel of the first node
-/// has room for all of it.
-template <class Block>
-void ChainPart::addToPanels(const int (&point)[4], Block&& block)
+/// Adds the stiffness of a displacement to the panels: of the weighted sum of a node and the next one, plus `column`
+/// times the turn of the edge between them. The panel of the first node has room for all of it.
+void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness,
+                            const Eigen::Vector3d& column)
 {
   const int node[2] = {nodeOf(point[0] - first_point), nodeOf(point[1] - first_point)};
   RodPanel* const panels = system_.panels();
   for (int p = 0; p < 2; ++p)
     if (node[p] >= 0)
-    {
-      const Eigen::Matrix3d own = block(p, p);
       for (int c = 0; c < 3; ++c)
         for (int r = c; r < 3; ++r)
-          panels[node[p]].diag[c][r] += own(r, c);
-    }
-  if (node[0] < 0 || node[1] < 0)
+          panels[node[p]].diag[c][r] += weight[p] * weight[p] * stiffness(r, c);
+  if (node[0] >= 0 && node[1] >= 0)
+    for (int c = 0; c < 3; ++c)
+      for (int r = 0; r < 3; ++r)
+        panels[node[0]].below[c][r] += weight[0] * weight[1] * stiffness(r, c);
+  if (node[0] < 0 || column.isZero(0.0))
     return;
-  const Eigen::Matrix3d between = block(1, 0);
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r)
-      panels[node[0]].below[c][r] += between(r, c);
-}
-
-/// Adds the stiffness of a contact with a solid to the panels.
-void ChainPart::addToPanels(const ContactTerm& term)
-{
-  addToPanels(term.point, [&](int i, int j) { return term.block(i, j, term.stiffness); });
-  const int first = nodeOf(term.point[0] - first_point), second = nodeOf(term.point[1] - first_point);
-  if (first < 0 || !term.turns())
-    return;
-  RodPanel& panel = system_.panels()[first];
-  const Eigen::Vector3d& column = term.turn[0].column;
-  const Eigen::Vector3d torque = term.stiffness * column, on_first = term.share(0, torque),
-                        on_second = term.share(1, torque);
+  const Eigen::Vector3d torque = stiffness * column;
   for (int c = 0; c < 3; ++c)
   {
-    panel.diag[c][3] += on_first[c];
-    if (second >= 0)
-      panel.below[3][c] += on_second[c];
+    panels[node[0]].diag[c][3] += weight[0] * torque[c];
+    if (node[1] >= 0)
+      panels[node[0]].below[3][c] += weight[1] * torque[c];
   }
-  panel.diag[3][3] += column.dot(torque);
+  panels[node[0]].diag[3][3] += column.dot(torque);
 }
 
 /// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the band.
@@ -79,11 +64,11 @@ void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
   for (const ContactTerm* term : own_terms)
   {
     for (int p = 0; p < 2; ++p)
-      addForce(term->point[p] - first_point, term->share(p, term->force));
+      addForce(term->point[p] - first_point, term->weight[p] * term->force);
     if (term->turns())
       addTorque(term->point[0] - first_point, term->turn[0].column.dot(term->force));
     if (with_hessian)
-      addToPanels(*term);
+      addToPanels(term->point, term->weight, term->stiffness, term->turn[0].column);
   }
   if (!with_hessian)
   {
@@ -91,7 +76,7 @@ void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
     return;
   }
   for (const ContactRow* row : own_rows)
-    addToPanels(row->point, [&](int i, int j) { return row->block(i, j); });
+    addToPanels(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
   evaluation.inertia = system_.factorWhole(shift);
 }
 

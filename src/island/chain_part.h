@@ -67,9 +67,8 @@ protected:
 private:
   template <class F>
   void forPanels(F&& f) const;
-  template <class Block>
-  void addToPanels(const int (&point)[4], Block&& block);
-  void addToPanels(const ContactTerm& term);
+  void addToPanels(const int (&point)[4], const double (&weight)[4], const Eigen::Matrix3d& stiffness,
+                   const Eigen::Vector3d& column = Eigen::Vector3d::Zero());
 
   int unknowns_ = 0;
   SchurComplement schur_;   ///< of the averages, while the part is not coupled

@@ -362,7 +362,7 @@ void SharedMatrix::addTurningTerm(const ContactTerm& term, const Bases& bases, c
   MergedRows merged;
   for (int p = 0; p < 4; ++p)
     for (int c = 0; c < 3 && bases[p] >= 0; ++c)
-      merged.place(bases[p] + c) += term.moveBy(p, Eigen::Vector3d::Unit(c));
+      merged.place(bases[p] + c)[c] += term.weight[p];
   for (int k = 0; k < 2; ++k)
     if (turns[k] >= 0)
       merged.place(turns[k]) += term.turn[k].column;
