@@ -59,10 +59,10 @@ void ContactPotential::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) con
 /// Finds the levers of a contact of cloth, so that for every force f across the normal n the moment of the forces on
 /// the points, the sum of x_k x (weight_k f + (lever_k . f) n), is that of a force f on the place where the other
 /// surface feels -f. A single corner on a plane has none. Curves have none either: the force along a fine curve would
-/// make normal forces as large as itself, from which friction would grow again.
+/// make normal forces as large as itself, from which friction would grow again. Levers have a limit for this reason.
 void ContactPotential::setLevers(Contact& contact) const
 {
-  constexpr double kLargest = 0.3;   // for the same reason: of cloth whose edges are shorter than a few thicknesses
+  constexpr double kLargest = 0.3;   // reached where edges are about three thicknesses long
   const auto isSheet = [&](int number) {
     return surface_.objects[number].curve_length == 0.0 && surface_.objects[number].carrier < 0;
   };
