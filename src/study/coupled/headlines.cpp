@@ -32,7 +32,7 @@ const HeadlineRegistration kCoupled{{
      {{"moment_of_contact"}},
      {100.0, " %", 1},
      "none",
-     "Friction along a rod has no lever. Where cloth touches cloth or bodies, less than 0.1 % is left."},
+     "Friction along a rod has no lever, while cloth on cloth or on bodies leaves less than 0.1 %."},
     {"body_contact",
      "stacks, cards, tipping cubes, narrow shafts at up to 1,000 m/s, each shape on each shape",
      {kWorst},
