@@ -11,13 +11,13 @@ namespace {
 
 using Vector = Eigen::Vector3d;
 
-/// Vectors a and b in the plane of e and f, so that e a^T + f b^T is the identity of this plane. If e and f are nearly
-/// parallel, it is about that of their line.
+/// Two vectors a and b in the plane of e and f. The matrix e a^T + f b^T maps each vector of this plane to itself. If e
+/// and f are nearly parallel, it does so only for vectors along them.
 struct DualVectors
 {
   DualVectors(const Vector& e, const Vector& f)
   {
-    constexpr double kLeast = 0.04;   // square of the sine: a and b would become too large
+    constexpr double kLeast = 0.04;   // square of the sine below which a and b would become too large
     const double along_e = e.norm(), along_f = f.norm();
     if (!(along_e > 0.0 && along_f > 0.0))
       return;
@@ -56,10 +56,11 @@ void ContactPotential::setTurns(const Eigen::Matrix3Xd& x, Contact& contact) con
     }
 }
 
-/// Finds the levers of a contact of cloth, so that for every force f across the normal n the moment of the forces on
-/// the points, the sum of x_k x (weight_k f + (lever_k . f) n), is that of a force f on the place where the other
-/// surface feels -f. A single corner on a plane has none. Curves have none either: the force along a fine curve would
-/// make normal forces as large as itself, from which friction would grow again. Levers have a limit for this reason.
+/// Finds the levers of a contact of cloth. The force on point k is weight_k f + (lever_k . f) n, where f is the
+/// friction, across the normal n. The levers give these forces the moment of a force f that acts where the other
+/// surface feels -f. A single corner on a plane has no levers. Curves have none either: along a fine curve, the forces
+/// along n would be as large as f itself, and friction would grow from them. The levers of cloth have a limit for the
+/// same reason.
 void ContactPotential::setLevers(Contact& contact) const
 {
   constexpr double kLargest = 0.3;   // reached where edges are about three thicknesses long

@@ -447,12 +447,12 @@ TEST(ContactSheets, FrictionSticksAndSlips)
 }
 
 /// Friction acts on surfaces: what two pieces exert on each other has no moment, though their middle surfaces are
-/// apart. What nearly parallel edges, needles and triangles seen from the side cannot take is left out.
+/// apart. Contacts whose levers are limited are left out.
 TEST(ContactSheets, FrictionHasNoMoment)
 {
   constexpr double kStep = 0.01, kMove = 1e-9;            // [s], [m] far less than the range in which friction sticks
-  constexpr double kLargest = 0.299, kLeastSine = 0.21;   // of a lever and of angles of edges: there levers end
-  constexpr double kClosest = 1e-6 * kSheetThickness;   // [m] a lever, as the points have moved when the force is found
+  constexpr double kLargest = 0.299, kLeastSine = 0.21;   // Beyond these, levers are limited.
+  constexpr double kClosest = 1e-6 * kSheetThickness;     // [m] The forces are those after the points have moved.
   Random random(8);
   int pairs = 0, on_solids = 0;
   for (int k = 0; k < 120; ++k)

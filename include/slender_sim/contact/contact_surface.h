@@ -159,22 +159,22 @@ struct ContactTerm
   /// of the sum over the points.
   bool carried = false;
   std::array<Turn, 2> turn{};   ///< u also contains column times the turn of each of these segments
-  /// Of friction, which acts at surfaces and not at points: u also contains, for each point, `lever` times the
-  /// displacement along `normal`. The lever is across the normal and has no unit.
+  /// Friction acts at surfaces and not at points. Its u therefore also contains, for each point, `lever` times the
+  /// displacement along `normal`. A lever is across the normal and has no unit.
   Eigen::Vector3d normal{0, 0, 0}, lever[4] = {normal, normal, normal, normal};
   Eigen::Vector3d force{0, 0, 0};   ///< on u [N], friction included
   double slip_range = 0.0;          ///< of friction that sticks: stretch at which it slips [m]; 0: other terms
   Eigen::Matrix3d stiffness = Eigen::Matrix3d::Zero(), geometric = Eigen::Matrix3d::Zero();
 
   bool turns() const { return !turn[0].column.isZero(0.0) || !turn[1].column.isZero(0.0); }
-  /// What a displacement of the point adds to u.
+  /// Returns what a displacement of point k adds to u.
   Eigen::Vector3d moveBy(int k, const Eigen::Vector3d& displacement) const
   {
     return weight[k] * displacement + normal.dot(displacement) * lever[k];
   }
-  /// What a force on u is on the point.
+  /// Returns the force on point k that a force f on u makes.
   Eigen::Vector3d share(int k, const Eigen::Vector3d& f) const { return weight[k] * f + lever[k].dot(f) * normal; }
-  /// The block of two points of the second derivative, for that in u.
+  /// Returns the block of points i and j of the second derivative; `second`: the second derivative in u.
   Eigen::Matrix3d block(int i, int j, const Eigen::Matrix3d& second) const
   {
     Eigen::Matrix3d sum = weight[i] * weight[j] * second;
@@ -200,7 +200,7 @@ struct ContactRow
   Eigen::Vector3d normal{0, 0, 0}, turning{0, 0, 0};
   double stiffness = 0.0;
 
-  /// The block of two points of the second derivative, without `turning`.
+  /// Returns the block of points i and j of this part of the second derivative, without `turning`.
   Eigen::Matrix3d block(int i, int j) const { return along[i] * along[j] * stiffness * normal * normal.transpose(); }
 };
 

@@ -45,7 +45,7 @@ std::string motionTable(double time, Row&& row)
 /// `method` of contact; `gap`: within which the barrier repels [m].
 std::string sceneText(const std::string& name, const std::string& method, double gap, double step)
 {
-  constexpr double kTurn = 0.97 * M_PI;   // of the strip's end [rad]: it does not press the layers together
+  constexpr double kTurn = 0.97 * M_PI;   // angle of the strip's end [rad]; half a turn would press the layers together
   std::ostringstream text;
   text << "time: {step: " << step << ", duration: 1, integrator: implicit_euler}\n";
   if (method == "barrier")
@@ -109,8 +109,8 @@ ContactRun runScene(const ContactScene& scene, const std::string& method, double
   return run;
 }
 
-/// CPU time of the barrier over that of the fastest run with impulses whose error is no larger: the mean over all runs
-/// of the barrier that have such a run, of the logarithms.
+/// Compares each run of the barrier with the fastest run by impulses whose error is no larger. ratio() is the geometric
+/// mean of the quotients of their CPU times. Runs of the barrier without such a partner are left out.
 class TimeAtEqualError
 {
 public:
