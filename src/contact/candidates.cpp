@@ -66,6 +66,7 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   }
   if (!sheets.empty())
     sheets_.build(surface, sheets, solids, motion, {gap, margin, shift_, turn_});
+  sheets_kept_ = !sheets.empty();
   built_ = true;
 }
 
@@ -131,9 +132,14 @@ bool Candidates::holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& so
 {
   if (!built_)
     return false;
-  const double length2 = way_.squaredNorm();   // of the way of all points
-  const double t = length2 > 0.0 ? std::clamp((x - start_).cwiseProduct(way_).sum() / length2, 0.0, 1.0) : 0.0;
-  if (((x - start_ - t * way_).array().abs() > margin_).any())
+  if (sheets_kept_)   // their volumes move with the mean of the motion
+  {
+    const double length2 = way_.squaredNorm();   // of the way of all points
+    const double t = length2 > 0.0 ? std::clamp((x - start_).cwiseProduct(way_).sum() / length2, 0.0, 1.0) : 0.0;
+    if (((x - start_ - t * way_).array().abs() > margin_).any())
+      return false;
+  }
+  else if ((x.array() < low_.array()).any() || (x.array() > high_.array()).any())
     return false;
   for (std::size_t k = 0; k < solids.size(); ++k)
     if ((solids[k].position - solids_[k].position).norm() > shift_[k] || angleBetween(solids[k], solids_[k]) > turn_[k])

@@ -43,7 +43,7 @@ private:
   void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
                    double gap, double margin);
 
-  bool built_ = false;
+  bool built_ = false, sheets_kept_ = false;
   double margin_ = 0.0;
   Eigen::Matrix3Xd start_, way_;   ///< of points: where the motion starts, and how far it leads
   Eigen::Matrix3Xd low_, high_;

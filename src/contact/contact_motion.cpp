@@ -9,6 +9,88 @@
 
 namespace slender {
 
+/// The pairs that surfaces may meet in during a motion.
+const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
+{
+  for (const Candidates* known : {&near_, &swept_})
+    if (known->holdsFor(motion.x, motion.solids) && known->holdsFor(motion.x_end, motion.solids_end))
+      return *known;
+  constexpr double kLongest = 10.0;   // gaps: after longer ways, evaluations would examine too many pairs
+  constexpr double kOfSheets = 0.4;   // gaps: in a wider margin, triangles find too many of their neighbours
+  const double moved = (motion.x_end - motion.x).colwise().norm().maxCoeff();
+  margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
+  Candidates& found = moved <= kLongest * options_.gap ? near_ : swept_;
+  const bool near = &found == &near_;
+  found.build(surface_, sheets_, solids_, motion, options_.gap, near ? margin_ : 0.0, near ? kTurnMargin : 0.0);
+  return found;
+}
+
+/// Calls take(meeting, limit) for each pair that may meet. limit() computes the share of the motion that the pair may
+/// go.
+template <class Take>
+void ContactPotential::forLimits(const SurfaceMotion& m, Take&& take)
+{
+  const Candidates& candidates = candidatesOf(m);
+  ApproachLimit limit;
+  const auto motion = [&](int i) { return MovingPoint{m.x.col(i), m.x_end.col(i)}; };
+  for (const GridPairs::Pair& pair : candidates.pairs())
+  {
+    const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
+    take(Meeting{a.a, b.a}, [&] {
+      const double scale = scaleOf(a, b);
+      limit.thickness = thicknessOf(pair, scale);
+      limit.reach = scale * options_.gap;
+      return segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit);
+    });
+  }
+  int solid = -1;
+  RigidMotion rigid{Pose{}, Pose{}};
+  const auto follow = [&](int wanted) {
+    if (wanted != solid)
+      rigid = RigidMotion(m.solids[wanted], m.solids_end[wanted]);
+    solid = wanted;
+  };
+  for (const Candidates::OnSolid& on : candidates.onSolids())
+  {
+    const ContactSegment& s = surface_.segments[on.segment];
+    if (!passes(on))
+      take(Meeting{s.a, -1, on.solid}, [&] {
+        follow(on.solid);
+        limit.thickness = thicknessOf(on);
+        limit.reach = rangeOf(s.object, on.solid) * options_.gap;
+        return segmentSolidLimit(motion(s.a), motion(s.b), solids_[on.solid].pieces[on.piece], rigid, limit);
+      });
+  }
+  if (sheets_.empty())
+    return;
+  for (const SheetCandidates::Pair& pair : candidates.sheets().pairs())
+  {
+    limit.reach = pair.scale * options_.gap;
+    limit.thickness = thicknessOf(pair);
+    if (pair.edges)
+    {
+      const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
+      take(Meeting{a.a, b.a}, [&] { return segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit); });
+      continue;
+    }
+    const auto& c = surface_.triangles[pair.second].corner;
+    const int p = sheets_.points[pair.first].point;
+    take(Meeting{p, c[0]},
+         [&] { return pointTriangleLimit(motion(p), motion(c[0]), motion(c[1]), motion(c[2]), limit); });
+  }
+  for (const SheetCandidates::OnSolid& on : candidates.sheets().onSolids())
+    if (!passes(on))
+      take(Meeting{on.face.corner[0], -1, on.solid}, [&] {
+        follow(on.solid);
+        limit.thickness = thicknessOf(on);
+        limit.reach = rangeOf(on.face.object, on.solid) * options_.gap;
+        MovingPoint corner[3];
+        for (int k = 0; k < on.face.corners; ++k)
+          corner[k] = motion(on.face.corner[k]);
+        return faceSolidLimit(corner, on.face.corners, solids_[on.solid].pieces[on.piece], rigid, limit);
+      });
+}
+
 double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
                                    const std::vector<Pose>& poses, const std::vector<Pose>& poses_end)
 {
@@ -16,49 +98,69 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   check(x_end, poses_end);
   if (!x.allFinite() || !x_end.allFinite())
     return 0.0;
-  const Candidates* candidates = &near_;
-  if (!near_.holdsFor(x, poses) || !near_.holdsFor(x_end, poses_end))
-  {
-    constexpr double kLongest = 10.0;   // gaps: after longer ways, evaluations would examine too many pairs
-    constexpr double kOfSheets = 0.4;   // gaps: in a wider margin, triangles find too many of their neighbours
-    const SurfaceMotion motion{x, x_end, poses, poses_end};
-    const double moved = (x_end - x).colwise().norm().maxCoeff();
-    margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
-    if (moved <= kLongest * options_.gap)
-      near_.build(surface_, sheets_, solids_, motion, options_.gap, margin_, kTurnMargin);
-    else
-    {
-      swept_.build(surface_, sheets_, solids_, motion, options_.gap, 0.0, 0.0);
-      candidates = &swept_;
-    }
-  }
   double share = 1.0;
-  ApproachLimit limit;
-  const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
-  for (const GridPairs::Pair& pair : candidates->pairs())
+  forLimits({x, x_end, poses, poses_end}, [&](const Meeting&, auto&& limit) { share = std::min(share, limit()); });
+  return share;
+}
+
+/// Two blocked movers go the same share of their ways. So do two others, which go all of them. Pairs of one kind and
+/// the other are examined again, with the ways that they go: if they would meet, both are blocked.
+void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& shares)
+{
+  constexpr int kMostRounds = 4;
+  check(motion.x, motion.solids);
+  check(motion.x_end, motion.solids_end);
+  const bool finite = motion.x.allFinite() && motion.x_end.allFinite();
+  const auto moverOf = [&](const Meeting& m) {
+    return m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other];
+  };
+  shares.share = finite ? 1.0 : 0.0;
+  if (finite)
+    forLimits(motion, [&](const Meeting& m, auto&& limit) {
+      if (const double share = limit(); share < 1.0)
+      {
+        shares.share = std::min(shares.share, share);
+        shares.block(shares.of_point[m.point]);
+        shares.block(moverOf(m));
+      }
+    });
+  for (int round = 0; shares.share < 1.0; ++round)
   {
-    const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
-    const double scale = scaleOf(a, b);
-    limit.thickness = thicknessOf(pair, scale);
-    limit.reach = scale * options_.gap;
-    share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
+    const auto free = std::find(shares.blocked.begin(), shares.blocked.end(), 0);
+    if (free == shares.blocked.end())
+      return;
+    if (round == kMostRounds || !finite)
+      return std::fill(free, shares.blocked.end(), 1);
+    setShared(motion, shares);
+    bool met = false;
+    forLimits({motion.x, shared_x_, motion.solids, shared_solids_}, [&](const Meeting& m, auto&& limit) {
+      const int a = shares.of_point[m.point], b = moverOf(m);
+      if (b == MotionShares::kPrescribed || shares.isBlocked(a) == shares.isBlocked(b) || limit() >= 1.0)
+        return;
+      shares.block(a);
+      shares.block(b);
+      met = true;
+    });
+    if (!met)
+      return;
   }
-  int solid = -1;
-  RigidMotion rigid{Pose{}, Pose{}};
-  for (const Candidates::OnSolid& on : candidates->onSolids())
-  {
-    if (passes(on))
-      continue;
-    if (on.solid != solid)
-      rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
-    solid = on.solid;
-    const ContactSegment& s = surface_.segments[on.segment];
-    limit.thickness = thicknessOf(on);
-    limit.reach = rangeOf(s.object, on.solid) * options_.gap;
-    share =
-        std::min(share, segmentSolidLimit(motion(s.a), motion(s.b), solids_[on.solid].pieces[on.piece], rigid, limit));
-  }
-  return sheets_.empty() ? share : std::min(share, sheetsLimit(*candidates, x, x_end, poses, poses_end));
+}
+
+/// Sets where points and solids get if each mover goes its share.
+void ContactPotential::setShared(const SurfaceMotion& motion, const MotionShares& shares)
+{
+  shared_x_ = motion.x_end;
+  for (Eigen::Index i = 0; i < shared_x_.cols(); ++i)
+    if (shares.isBlocked(shares.of_point[i]))
+      shared_x_.col(i) = motion.x.col(i) + shares.share * (motion.x_end.col(i) - motion.x.col(i));
+  shared_solids_ = motion.solids_end;
+  for (std::size_t k = 0; k < shared_solids_.size(); ++k)
+    if (shares.isBlocked(shares.of_solid[k]))
+    {
+      const Pose &from = motion.solids[k], &to = motion.solids_end[k];
+      shared_solids_[k].position = from.position + shares.share * (to.position - from.position);
+      shared_solids_[k].orientation = from.orientation.slerp(shares.share, to.orientation);
+    }
 }
 
 double ContactPotential::thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness)

@@ -10,6 +10,7 @@
 #include "barrier_stiffness.h"
 #include "candidates.h"
 #include "held_pieces.h"
+#include "motion_shares.h"
 #include "slender_sim/contact/barrier.h"
 #include "slender_sim/contact/contact_surface.h"
 #include "soft_gap.h"
@@ -104,6 +105,9 @@ public:
   /// surfaces meet at x.
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
+  /// The same, where movers that are not blocked go all of their ways. `shares` begins with the movers that are blocked
+  /// anyway. Adds those that would meet something, and sets the share of all of them.
+  void limitShares(const SurfaceMotion& motion, MotionShares& shares);
 
   /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
   /// had moved straight from begin() to their present places. In one long step the iterates of a solution can go around
@@ -286,8 +290,15 @@ private:
   {
     return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
   }
-  double sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
-                     const std::vector<Pose>& solids, const std::vector<Pose>& solids_end) const;
+  /// Points, one of each piece that may meet another one, or a point and a solid.
+  struct Meeting
+  {
+    int point, other, solid = -1;
+  };
+  const Candidates& candidatesOf(const SurfaceMotion& motion);
+  template <class Take>
+  void forLimits(const SurfaceMotion& motion, Take&& take);
+  void setShared(const SurfaceMotion& motion, const MotionShares& shares);
   double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 
   ContactSurface surface_;
@@ -315,6 +326,8 @@ private:
   double last_change_ = kInfinity, relaxation_ = 1.0;
   double shift_ = 0.0;   ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
+  Eigen::Matrix3Xd shared_x_;         ///< for limitShares()
+  std::vector<Pose> shared_solids_;   ///< likewise
   SheetPieces sheets_;
   HeldPieces held_;
   std::vector<Displacements> displacements_;   ///< per object, see movedFar()

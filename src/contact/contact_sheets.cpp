@@ -109,46 +109,6 @@ double ContactPotential::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetC
   return addContact(x, gap, contact, rangeOf(face.object, on.solid), with_stiffness);
 }
 
-double ContactPotential::sheetsLimit(const Candidates& candidates, const Eigen::Matrix3Xd& x,
-                                     const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& poses,
-                                     const std::vector<Pose>& poses_end) const
-{
-  double share = 1.0;
-  ApproachLimit limit;
-  const auto motion = [&](int i) { return MovingPoint{x.col(i), x_end.col(i)}; };
-  for (const SheetCandidates::Pair& pair : candidates.sheets().pairs())
-  {
-    limit.reach = pair.scale * options_.gap;
-    limit.thickness = thicknessOf(pair);
-    if (pair.edges)
-    {
-      const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
-      share = std::min(share, segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit));
-      continue;
-    }
-    const auto& c = surface_.triangles[pair.second].corner;
-    const int p = sheets_.points[pair.first].point;
-    share = std::min(share, pointTriangleLimit(motion(p), motion(c[0]), motion(c[1]), motion(c[2]), limit));
-  }
-  int solid = -1;
-  RigidMotion rigid{Pose{}, Pose{}};
-  for (const SheetCandidates::OnSolid& on : candidates.sheets().onSolids())
-  {
-    if (passes(on))
-      continue;
-    if (on.solid != solid)
-      rigid = RigidMotion(poses[on.solid], poses_end[on.solid]);
-    solid = on.solid;
-    limit.thickness = thicknessOf(on);
-    limit.reach = rangeOf(on.face.object, on.solid) * options_.gap;
-    MovingPoint corner[3];
-    for (int k = 0; k < on.face.corners; ++k)
-      corner[k] = motion(on.face.corner[k]);
-    share = std::min(share, faceSolidLimit(corner, on.face.corners, solids_[on.solid].pieces[on.piece], rigid, limit));
-  }
-  return share;
-}
-
 bool ContactPotential::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   for (const SheetCandidates::Pair& pair : near_.sheets().pairs())

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "island/equations_loops.h"
 
@@ -14,6 +15,9 @@ void Equations::setParts(const std::vector<Part*>& parts)
 {
   parts_valid_ = parts_valid_ && parts == parts_;
   parts_ = parts;
+  for (std::size_t k = 0; k < parts_.size(); ++k)
+    parts_[k]->number = static_cast<int>(k);
+  shares_.blocked.assign(parts_.size(), 1);
 }
 
 void Equations::setContact(ContactSurface surface, const ContactOptions& options)
@@ -32,11 +36,16 @@ void Equations::setThreads(int threads, bool parallel)
 void Equations::countPoints()
 {
   part_of_point_.clear();
+  shares_.of_point.clear();
   for (Part* part : parts_)
   {
     part->first_point = static_cast<int>(part_of_point_.size());
     part_of_point_.insert(part_of_point_.end(), static_cast<std::size_t>(part->points()), part);
+    shares_.of_point.insert(shares_.of_point.end(), static_cast<std::size_t>(part->points()), part->number);
   }
+  shares_.of_solid.clear();
+  for (const IslandSolid& solid : solids)
+    shares_.of_solid.push_back(solid.body ? solid.body->number : MotionShares::kPrescribed);
   const auto count = static_cast<Eigen::Index>(part_of_point_.size());
   for (auto* x : {&points_, &points_base_, &points_end_})
     if (x->cols() != count)
@@ -47,6 +56,7 @@ void Equations::countPoints()
 
 void Equations::numberUnknowns()
 {
+  unsettle();
   for (Part* part : parts_)
     parts_valid_ = part->numberUnknowns() && parts_valid_;
 }
@@ -75,6 +85,7 @@ void Equations::gatherSolids(std::vector<Pose>& poses) const
 
 void Equations::place(double fraction)
 {
+  unsettle();
   if (contact_)
     placeSolids(fraction, prescribed_);
   for (Part* part : parts_)
@@ -88,7 +99,31 @@ void Equations::follow()
   for (Part* part : parts_)
     part->followJoints();
   for (Part* part : parts_)
-    part->meetAverages();
+    if (!part->settled)
+      part->meetAverages();
+}
+
+void Equations::unsettle()
+{
+  for (Part* part : parts_)
+  {
+    part->settled = false;
+    part->increment = kInfinity;
+  }
+}
+
+/// Parts that have arrived need no more iterations, while those that touch others still do. Their last increment was
+/// within the tolerance of positions in contact, so that the next one would be far smaller.
+void Equations::settle()
+{
+  constexpr double kArrived = 1e-3;   // of the gap
+  const double tolerance = kArrived * contact_->options().gap / tolerances.least_edge;
+  for (Part* part : parts_)
+  {
+    if (moved_fully_ && shift_.none() && isAlone(*part) && part->increment <= tolerance)
+      part->settled = true;
+    part->increment = kInfinity;
+  }
 }
 
 bool Equations::solidsMove() const
@@ -147,6 +182,7 @@ void Equations::beginSubstep(double fraction)
 
 void Equations::beginStage(bool first)
 {
+  unsettle();
   if (!contact_)
     return;
   matrix_.beginStage();
@@ -178,24 +214,28 @@ void Equations::endStage()
 }
 
 /// Goes from the base towards the trial, as far as nothing touches and no curve is folded. Where nothing moves as
-/// prescribed, the trial that was reached is the start of the solution. Otherwise what is prescribed has to wait there
-/// until all else gave way.
+/// prescribed, the trial that was reached is the start of the solution, and what is not blocked goes all of its way.
+/// Otherwise what is prescribed has to wait there until all else gave way.
 Approach Equations::approach(double from, double to, double& reached)
 {
   constexpr int kMostRetreats = 20;   // each by half
-  gather(points_end_, poses_end_);
-  double alpha = contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
   const bool held_moves =
       std::any_of(parts_.begin(), parts_.end(), [&](const Part* part) { return part->heldMoves(from, to); });
   const bool moving = held_moves || (from < to && solidsMove());
+  for (const Part* part : parts_)
+    shares_.blocked[part->number] = moving || part->joined();
+  limitShares();
+  double alpha = shares_.share;
   reached = to;
   bool only_folded = false;
   for (int attempt = 0; attempt < kMostRetreats; ++attempt, alpha *= 0.5)
   {
     if (alpha < 1.0)
     {
+      unsettle();
       for (Part* part : parts_)
-        part->retreat(attempt == 0 ? alpha : 0.5);
+        if (attempt > 0 || shares_.isBlocked(part->number))
+          part->retreat(attempt == 0 ? alpha : 0.5);
       if (moving)
         reached = from + alpha * (to - from);
       place(reached);
@@ -215,23 +255,35 @@ Approach Equations::approach(double from, double to, double& reached)
   return only_folded ? Approach::arrived : Approach::squeezed;
 }
 
+/// Sets how far parts may go from the base to the trial.
+void Equations::limitShares()
+{
+  gather(points_end_, poses_end_);
+  contact_->limitShares({points_base_, points_end_, poses_base_, poses_end_}, shares_);
+}
+
 double Equations::roomToTrial()
 {
   gather(points_end_, poses_end_);
   return contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
 }
 
+/// Parts that contact does not block go all of their way.
 void Equations::moveAlong(double alpha)
 {
-  forParts([&](Part& part) { part.moveAlong(alpha); });
+  const double others = alpha > 0.0 ? std::min(1.0, alpha / least_share_) : 0.0;
+  moved_fully_ = others == 1.0;
+  forParts([&](Part& part) { part.moveAlong(shares_.isBlocked(part.number) ? alpha : others); });
   follow();
 }
 
 void Equations::accept()
 {
   forParts([](Part& part) { part.accept(); });
-  if (contact_)
-    endStage();
+  if (!contact_)
+    return;
+  settle();
+  endStage();
 }
 
 void Equations::saveBase()
@@ -242,29 +294,40 @@ void Equations::saveBase()
 
 void Equations::restoreBase()
 {
+  unsettle();
   for (Part* part : parts_)
     part->restoreBase();
 }
 
 // ---- measures
 
+/// Coupled parts go the same share of the direction, because that of one part suits those of the others alone.
 double Equations::stepLimit()
 {
   double alpha = 1.0;
   for (const Part* part : parts_)
-    alpha = std::min(alpha, part->stepLimit());
+    if (!part->settled)
+      alpha = std::min(alpha, part->stepLimit());
   if (!contact_)
     return alpha;
   moveAlong(alpha);
-  return alpha * roomToTrial();
+  for (const Part* part : parts_)
+    shares_.blocked[part->number] = part->coupled;
+  limitShares();
+  least_share_ = shares_.share;
+  return alpha * least_share_;
 }
 
-double Equations::incrementSize() const
+double Equations::incrementSize()
 {
   constexpr double kStick = 0.3;   // of the range in which friction sticks; the increment after is far smaller
   double largest = 0.0;
-  for (const Part* part : parts_)
-    largest = std::max(largest, part->incrementSize(tolerances.least_edge));
+  for (Part* part : parts_)
+    if (!part->settled)
+    {
+      part->increment = part->incrementSize(tolerances.least_edge);
+      largest = std::max(largest, part->increment);
+    }
   if (!contact_)
     return largest;
   // A barrier is resolved when its gaps are, and friction that sticks when the stretch of its springs is.
@@ -311,7 +374,8 @@ double Equations::slope() const
 {
   double sum = 0.0;
   for (const Part* part : parts_)
-    sum += part->slope();
+    if (!part->settled)
+      sum += part->slope();
   return sum;
 }
 

@@ -112,7 +112,7 @@ private:
   void saveBase();
   void restoreBase();
   double stepLimit();
-  double incrementSize() const;
+  double incrementSize();
   bool sticksAfter(double rate) const;
   void measureContacts();
   bool anglesMayKeepShift() const { return tolerances.angles_may_keep_shift; }
@@ -141,6 +141,11 @@ private:
   RigidPart* bodyOf(int solid) const { return solid < 0 ? nullptr : solids[solid].body; }
   bool isOwn(const ContactTerm& term) const { return !exact_ && term.solid >= 0 && !bodyOf(term.solid); }
 
+  /// Whether nothing couples or touches the part.
+  static bool isAlone(const Part& part) { return !part.coupled && part.own_terms.empty(); }
+  void unsettle();
+  void settle();
+  void limitShares();
   void countPoints();
   void placeSolids(double fraction, std::vector<Pose>& poses) const;
   void gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const;
@@ -198,7 +203,10 @@ private:
   /// Per point, turns of segments: at the start of the stage and at the base since the substep began, and at the trial
   /// since the stage began [rad].
   Eigen::VectorXd turns_begin_, turns_base_, turns_;
-  bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
+  MotionShares shares_;
+  double least_share_ = 1.0;   ///< of the direction that blocked parts may go
+  bool moved_fully_ = false;   ///< The last moveAlong() went all of the way of what is not blocked.
+  bool pushing_ = false;       ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
   /// Largest relative motion of touching surfaces by the direction: of all contacts [m], and of contacts that stick, as

@@ -9,13 +9,15 @@
 /// Loops over the parts and the contacts of an island. Private to Equations.
 namespace slender {
 
+/// Leaves out settled parts.
 template <class F>
 void Equations::forParts(F&& f)
 {
   if (!parallel_ || threads_ == 1)
   {
     for (Part* part : parts_)   // OpenMP would take memory for its one thread
-      f(*part);
+      if (!part->settled)
+        f(*part);
     return;
   }
   const int count = static_cast<int>(parts_.size());
@@ -23,7 +25,8 @@ void Equations::forParts(F&& f)
 #pragma omp parallel for schedule(dynamic, 4) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
 #endif
   for (int k = 0; k < count; ++k)
-    f(*parts_[k]);
+    if (!parts_[k]->settled)
+      f(*parts_[k]);
 }
 
 template <class F>

@@ -351,6 +351,8 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   }
   if (!parts_valid_ || !keys_valid_)
     buildPattern();
+  for (Part* part : parts_)
+    part->settled = part->settled && isAlone(*part);
   forParts([&](Part& part) { part.evaluate(with_hessian, shift); });
   for (const Part* part : parts_)
   {
@@ -396,6 +398,7 @@ void Equations::solve()
     if (!part.coupled)
       part.solve();
   });
+  least_share_ = 1.0;
   spread();
   if (contact_)
     measureContacts();

@@ -21,10 +21,14 @@ namespace slender {
 /// What Equations writes into a part.
 struct PartInIsland
 {
-  const void* island = nullptr;                ///< in which the part was stepped last
-  bool coupled = false;                        ///< the matrix of the island has its unknowns
-  int offset = 0;                              ///< number of its first unknown in that matrix
-  int block = 0;                               ///< number of its block of that matrix
+  const void* island = nullptr;   ///< in which the part was stepped last
+  bool coupled = false;           ///< the matrix of the island has its unknowns
+  int offset = 0;                 ///< number of its first unknown in that matrix
+  int block = 0;                  ///< number of its block of that matrix
+  /// Newton's method has arrived for the part, which nothing couples or touches. It is left alone until that changes.
+  bool settled = false;
+  double increment = 0.0;                      ///< incrementSize() of the present direction
+  int number = 0;                              ///< among the parts of the island
   int first_point = 0;                         ///< number of its first surface point among those of the island
   std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
   std::vector<const ContactRow*> own_rows;     ///< likewise
