@@ -25,70 +25,94 @@ const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
   return found;
 }
 
-/// Calls take(meeting, limit) for each pair that may meet. limit() computes the share of the motion that the pair may
-/// go.
-template <class Take>
-void ContactPotential::forLimits(const SurfaceMotion& m, Take&& take)
+ContactPotential::Meeting ContactPotential::meetingOf(const GridPairs::Pair& pair) const
 {
-  const Candidates& candidates = candidatesOf(m);
+  return {surface_.segments[pair.first].a, surface_.segments[pair.second].a};
+}
+
+ContactPotential::Meeting ContactPotential::meetingOf(const Candidates::OnSolid& on) const
+{
+  return {surface_.segments[on.segment].a, -1, on.solid};
+}
+
+ContactPotential::Meeting ContactPotential::meetingOf(const SheetCandidates::Pair& pair) const
+{
+  return pair.edges ? Meeting{sheets_.edges[pair.first].a, sheets_.edges[pair.second].a}
+                    : Meeting{sheets_.points[pair.first].point, surface_.triangles[pair.second].corner[0]};
+}
+
+ContactPotential::Meeting ContactPotential::meetingOf(const SheetCandidates::OnSolid& on) const
+{
+  return {on.face.corner[0], -1, on.solid};
+}
+
+// ---- the share of a motion that a pair may go
+
+double ContactPotential::limitOf(const SurfaceMotion& m, const GridPairs::Pair& pair) const
+{
+  const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
+  const double scale = scaleOf(a, b);
   ApproachLimit limit;
-  const auto motion = [&](int i) { return MovingPoint{m.x.col(i), m.x_end.col(i)}; };
-  for (const GridPairs::Pair& pair : candidates.pairs())
+  limit.thickness = thicknessOf(pair, scale);
+  limit.reach = scale * options_.gap;
+  return segmentsLimit(m.of(a.a), m.of(a.b), m.of(b.a), m.of(b.b), limit);
+}
+
+double ContactPotential::limitOf(const SurfaceMotion& m, const Candidates::OnSolid& on) const
+{
+  if (passes(on))
+    return 1.0;
+  const ContactSegment& s = surface_.segments[on.segment];
+  ApproachLimit limit;
+  limit.thickness = thicknessOf(on);
+  limit.reach = rangeOf(s.object, on.solid) * options_.gap;
+  return segmentSolidLimit(m.of(s.a), m.of(s.b), solids_[on.solid].pieces[on.piece], rigid_[on.solid], limit);
+}
+
+double ContactPotential::limitOf(const SurfaceMotion& m, const SheetCandidates::Pair& pair) const
+{
+  ApproachLimit limit;
+  limit.thickness = thicknessOf(pair);
+  limit.reach = pair.scale * options_.gap;
+  if (pair.edges)
   {
-    const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
-    take(Meeting{a.a, b.a}, [&] {
-      const double scale = scaleOf(a, b);
-      limit.thickness = thicknessOf(pair, scale);
-      limit.reach = scale * options_.gap;
-      return segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit);
-    });
+    const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
+    return segmentsLimit(m.of(a.a), m.of(a.b), m.of(b.a), m.of(b.b), limit);
   }
-  int solid = -1;
-  RigidMotion rigid{Pose{}, Pose{}};
-  const auto follow = [&](int wanted) {
-    if (wanted != solid)
-      rigid = RigidMotion(m.solids[wanted], m.solids_end[wanted]);
-    solid = wanted;
-  };
-  for (const Candidates::OnSolid& on : candidates.onSolids())
-  {
-    const ContactSegment& s = surface_.segments[on.segment];
-    if (!passes(on))
-      take(Meeting{s.a, -1, on.solid}, [&] {
-        follow(on.solid);
-        limit.thickness = thicknessOf(on);
-        limit.reach = rangeOf(s.object, on.solid) * options_.gap;
-        return segmentSolidLimit(motion(s.a), motion(s.b), solids_[on.solid].pieces[on.piece], rigid, limit);
-      });
-  }
-  if (sheets_.empty())
-    return;
-  for (const SheetCandidates::Pair& pair : candidates.sheets().pairs())
-  {
-    limit.reach = pair.scale * options_.gap;
-    limit.thickness = thicknessOf(pair);
-    if (pair.edges)
-    {
-      const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
-      take(Meeting{a.a, b.a}, [&] { return segmentsLimit(motion(a.a), motion(a.b), motion(b.a), motion(b.b), limit); });
-      continue;
-    }
-    const auto& c = surface_.triangles[pair.second].corner;
-    const int p = sheets_.points[pair.first].point;
-    take(Meeting{p, c[0]},
-         [&] { return pointTriangleLimit(motion(p), motion(c[0]), motion(c[1]), motion(c[2]), limit); });
-  }
-  for (const SheetCandidates::OnSolid& on : candidates.sheets().onSolids())
-    if (!passes(on))
-      take(Meeting{on.face.corner[0], -1, on.solid}, [&] {
-        follow(on.solid);
-        limit.thickness = thicknessOf(on);
-        limit.reach = rangeOf(on.face.object, on.solid) * options_.gap;
-        MovingPoint corner[3];
-        for (int k = 0; k < on.face.corners; ++k)
-          corner[k] = motion(on.face.corner[k]);
-        return faceSolidLimit(corner, on.face.corners, solids_[on.solid].pieces[on.piece], rigid, limit);
-      });
+  const auto& c = surface_.triangles[pair.second].corner;
+  return pointTriangleLimit(m.of(sheets_.points[pair.first].point), m.of(c[0]), m.of(c[1]), m.of(c[2]), limit);
+}
+
+double ContactPotential::limitOf(const SurfaceMotion& m, const SheetCandidates::OnSolid& on) const
+{
+  if (passes(on))
+    return 1.0;
+  ApproachLimit limit;
+  limit.thickness = thicknessOf(on);
+  limit.reach = rangeOf(on.face.object, on.solid) * options_.gap;
+  MovingPoint corner[3];
+  for (int k = 0; k < on.face.corners; ++k)
+    corner[k] = m.of(on.face.corner[k]);
+  return faceSolidLimit(corner, on.face.corners, solids_[on.solid].pieces[on.piece], rigid_[on.solid], limit);
+}
+
+/// Calls take(meeting, limit) for each pair that may not go the whole motion, if wanted(meeting) is true.
+template <class Wanted, class Take>
+void ContactPotential::forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take)
+{
+  constexpr int kChunk = 256;
+  const Candidates& candidates = candidatesOf(motion);
+  rigid_.clear();
+  for (std::size_t k = 0; k < motion.solids.size(); ++k)
+    rigid_.emplace_back(motion.solids[k], motion.solids_end[k]);
+  limits_.resize(static_cast<std::size_t>(count(candidates)));
+  parallelFor(count(candidates) <= kChunk ? 1 : threads_, count(candidates), kChunk, [&](int k) {
+    visit(candidates, k,
+          [&](const auto& candidate) { limits_[k] = wanted(meetingOf(candidate)) ? limitOf(motion, candidate) : 1.0; });
+  });
+  for (int k = 0; k < count(candidates); ++k)
+    if (limits_[k] < 1.0)
+      visit(candidates, k, [&](const auto& candidate) { take(meetingOf(candidate), limits_[k]); });
 }
 
 double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end,
@@ -99,7 +123,9 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   if (!x.allFinite() || !x_end.allFinite())
     return 0.0;
   double share = 1.0;
-  forLimits({x, x_end, poses, poses_end}, [&](const Meeting&, auto&& limit) { share = std::min(share, limit()); });
+  forLimits(
+      {x, x_end, poses, poses_end}, [](const Meeting&) { return true; },
+      [&](const Meeting&, double limit) { share = std::min(share, limit); });
   return share;
 }
 
@@ -115,15 +141,17 @@ void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& sh
     return m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other];
   };
   shares.share = finite ? 1.0 : 0.0;
+  const auto block = [&](const Meeting& m) {
+    shares.block(shares.of_point[m.point]);
+    shares.block(moverOf(m));
+  };
   if (finite)
-    forLimits(motion, [&](const Meeting& m, auto&& limit) {
-      if (const double share = limit(); share < 1.0)
-      {
-        shares.share = std::min(shares.share, share);
-        shares.block(shares.of_point[m.point]);
-        shares.block(moverOf(m));
-      }
-    });
+    forLimits(
+        motion, [](const Meeting&) { return true; },
+        [&](const Meeting& m, double limit) {
+          shares.share = std::min(shares.share, limit);
+          block(m);
+        });
   for (int round = 0; shares.share < 1.0; ++round)
   {
     const auto free = std::find(shares.blocked.begin(), shares.blocked.end(), 0);
@@ -133,12 +161,12 @@ void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& sh
       return std::fill(free, shares.blocked.end(), 1);
     setShared(motion, shares);
     bool met = false;
-    forLimits({motion.x, shared_x_, motion.solids, shared_solids_}, [&](const Meeting& m, auto&& limit) {
-      const int a = shares.of_point[m.point], b = moverOf(m);
-      if (b == MotionShares::kPrescribed || shares.isBlocked(a) == shares.isBlocked(b) || limit() >= 1.0)
-        return;
-      shares.block(a);
-      shares.block(b);
+    const auto differ = [&](const Meeting& m) {
+      return moverOf(m) != MotionShares::kPrescribed &&
+             shares.isBlocked(shares.of_point[m.point]) != shares.isBlocked(moverOf(m));
+    };
+    forLimits({motion.x, shared_x_, motion.solids, shared_solids_}, differ, [&](const Meeting& m, double) {
+      block(m);
       met = true;
     });
     if (!met)

@@ -109,7 +109,7 @@ void ContactPotential::setPieces(const ContactSurface& pieces)
   held_.build(surface_);
   listSegments();
   lagged_.clear();
-  contacts_.clear();
+  found_.clear();
   near_.clear();
   swept_.clear();
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
@@ -141,11 +141,27 @@ void ContactPotential::check(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
                                 std::to_string(surface_.solids.size()));
 }
 
+void ContactPotential::Batch::clear()
+{
+  contacts.clear();
+  measures.clear();
+  terms.clear();
+  rows.clear();
+  meet = false;
+}
+
+void ContactPotential::Batch::append(const Batch& other)
+{
+  contacts.insert(contacts.end(), other.contacts.begin(), other.contacts.end());
+  measures.insert(measures.end(), other.measures.begin(), other.measures.end());
+  terms.insert(terms.end(), other.terms.begin(), other.terms.end());
+  rows.insert(rows.end(), other.rows.begin(), other.rows.end());
+  meet = meet || other.meet;
+}
+
 double ContactPotential::restart()
 {
-  terms_.clear();
-  rows_.clear();
-  contacts_.clear();
+  found_.clear();
   smallest_gap_ = kInfinity;
   for (BarrierStiffness& own : stiffness_)
     own.restart();
@@ -162,38 +178,44 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
   x_now_ = x;
   if (!near_.holdsFor(x, poses))
     near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, options_.gap, margin_, kTurnMargin);
-  double energy = 0.0;
-  for (const GridPairs::Pair& pair : near_.pairs())
-  {
-    energy += addPair(x, pair, with_stiffness);
-    if (!std::isfinite(energy))
-      return restart();
-  }
-  for (const Candidates::OnSolid& on : near_.onSolids())
-  {
-    energy += addOnSolid(x, on, poses, with_stiffness);
-    if (!std::isfinite(energy))
-      return restart();
-  }
-  if (!sheets_.empty())
-    energy += addSheets(x, poses, with_stiffness);
-  if (!std::isfinite(energy))
+  const Place place{x, poses, with_stiffness};
+  inBatches(count(near_), [&](int first, int last, Batch& out) {
+    for (int k = first; k < last && !out.meet; ++k)
+      visit(near_, k, [&](const auto& candidate) { out.meet = !add(place, candidate, out); });
+  });
+  if (found_.meet)
     return restart();
-  return energy + addFriction(x, poses, turns, with_stiffness);
+  double energy = 0.0;
+  for (std::size_t k = 0; k < found_.contacts.size(); ++k)
+  {
+    const Measure& m = found_.measures[k];
+    energy += m.energy;
+    smallest_gap_ = std::min(smallest_gap_, m.gap);
+    for (const int object : {found_.contacts[k].object, found_.contacts[k].other})
+      if (object >= 0)
+        stiffness_[object].take(m.force, m.stiffness, m.share);
+  }
+  return energy + addFriction(place, turns);
 }
 
-double ContactPotential::addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness)
+int ContactPotential::count(const Candidates& c)
+{
+  return static_cast<int>(c.pairs().size() + c.onSolids().size() + c.sheets().pairs().size() +
+                          c.sheets().onSolids().size());
+}
+
+bool ContactPotential::add(const Place& place, const GridPairs::Pair& pair, Batch& out) const
 {
   const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
-  const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
+  const Eigen::Vector3d a0 = place.x.col(a.a), a1 = place.x.col(a.b), b0 = place.x.col(b.a), b1 = place.x.col(b.b);
   const double scale = scaleOf(a, b), thickness = thicknessOf(pair, scale), range = thickness + scale * options_.gap;
   const Eigen::Vector3d e = a1 - a0, f = b1 - b0;
   const double middles2 = 0.25 * (a0 + a1 - b0 - b1).squaredNorm();
   // half the lengths and the range, squared: (p + q + r)^2 <= 3 (p^2 + q^2 + r^2)
   if (middles2 > 0.75 * (e.squaredNorm() + f.squaredNorm()) + 3.0 * range * range ||
       segmentDistance(a0, a1, b0, b1) >= range)
-    return 0.0;
-  const PairGap gap = edgesGap(a0, a1, b0, b1, thickness, with_stiffness);
+    return true;
+  const PairGap gap = edgesGap(a0, a1, b0, b1, thickness, place.with_stiffness);
   const double share = b.coreRadius() / (a.coreRadius() + b.coreRadius());
   Contact contact{pair.first,
                   pair.second,
@@ -205,23 +227,22 @@ double ContactPotential::addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pai
                   Eigen::Vector3d::Zero(),
                   a.object,
                   b.object};
-  return addContact(x, gap, contact, scale, with_stiffness);
+  return addContact(place, gap, contact, scale, out);
 }
 
-double ContactPotential::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on,
-                                    const std::vector<Pose>& poses, bool with_stiffness)
+bool ContactPotential::add(const Place& place, const Candidates::OnSolid& on, Batch& out) const
 {
   if (passes(on))
-    return 0.0;
-  const Pose& pose = poses[on.solid];
+    return true;
+  const Pose& pose = place.poses[on.solid];
   const ContactSegment& s = surface_.segments[on.segment];
   const ConvexPiece& piece = solids_[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
-  const Eigen::Vector3d a = to_solid * Eigen::Vector3d(x.col(s.a) - pose.position),
-                        b = to_solid * Eigen::Vector3d(x.col(s.b) - pose.position);
+  const Eigen::Vector3d a = to_solid * Eigen::Vector3d(place.x.col(s.a) - pose.position),
+                        b = to_solid * Eigen::Vector3d(place.x.col(s.b) - pose.position);
   const double radius = thicknessOf(on);
   if (leastDistance(piece, a, b) > radius + options_.gap)
-    return 0.0;
+    return true;
   const Eigen::Vector3d ends[2] = {a, b};
   PairGap gap = facePieceGap(ends, 2, radius, piece);
   const Eigen::Vector3d foot = a + gap.place[1] * (b - a) - radius * gap.normal;   // on the segment's surface
@@ -237,39 +258,39 @@ double ContactPotential::addOnSolid(const Eigen::Matrix3Xd& x, const Candidates:
                   Eigen::Vector3d::Zero(),
                   s.object,
                   -1};
-  setOwn(contact, poses);
-  return addContact(x, gap, contact, rangeOf(s.object, on.solid), with_stiffness);
+  setOwn(contact, place.poses);
+  return addContact(place, gap, contact, rangeOf(s.object, on.solid), out);
 }
 
-double ContactPotential::addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale,
-                                    bool with_stiffness)
+bool ContactPotential::addContact(const Place& place, const PairGap& gap, Contact& contact, double scale,
+                                  Batch& out) const
 {
   if (!(gap.gap > 0.0))
-    return kInfinity;
+    return false;
   const double g = gap.gap / scale;
   if (g >= options_.gap)
-    return 0.0;
-  const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier_.force(g);
+    return true;
+  const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier_.force(g),
+               energy = pair_stiffness * barrier_.energy(g) * scale;
+  if (!std::isfinite(energy))
+    return false;
   copyFour(contact.weight, gap.place);
   contact.force = force * gap.weight * gap.normal;
-  setTurns(x, contact);
-  ContactTerm& term = addTerm(contact);
+  setTurns(place.x, contact);
+  ContactTerm& term = addTerm(contact, out);
   term.force = contact.force;
-  if (with_stiffness)
+  if (place.with_stiffness)
   {
     const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
     const double own = pair_stiffness * barrier_.stiffness(g) / scale * gap.weight * gap.weight;
     term.stiffness = own * normals;
     if (contact.solid < 0)
       term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
-    addMotion(gap, contact, force, own);
+    addMotion(gap, contact, force, own, out);
   }
-  contacts_.push_back(contact);
-  smallest_gap_ = std::min(smallest_gap_, gap.gap);
-  for (const int object : {contact.object, contact.other})
-    if (object >= 0)
-      stiffness_[object].take(force * gap.weight, pair_stiffness, g / options_.gap);
-  return pair_stiffness * barrier_.energy(g) * scale;
+  out.contacts.push_back(contact);
+  out.measures.push_back({energy, gap.gap, g / options_.gap, force * gap.weight, pair_stiffness});
+  return true;
 }
 
 double ContactPotential::stiffnessOf(const Contact& contact) const
@@ -279,9 +300,9 @@ double ContactPotential::stiffnessOf(const Contact& contact) const
                                                           : stiffness_[contact.other].value());
 }
 
-ContactTerm& ContactPotential::addTerm(const Contact& contact)
+ContactTerm& ContactPotential::addTerm(const Contact& contact, Batch& out)
 {
-  ContactTerm& term = terms_.emplace_back();
+  ContactTerm& term = out.terms.emplace_back();
   copyFour(term.point, contact.point);
   copyFour(term.weight, contact.weight);
   for (int k = 0; k < 2; ++k)
@@ -293,15 +314,14 @@ ContactTerm& ContactPotential::addTerm(const Contact& contact)
 
 /// The place of contact runs along the pieces as they turn: force r^T H^-1 r of the gap, column by column of
 /// H = L D L^T.
-void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, double force, double own)
+void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, double force, double own, Batch& out)
 {
   constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
   const auto add = [&](const Eigen::Vector4d& along, const Eigen::Vector3d& turning, double d) {
     const double k = force / d;
     if (!(d > 0.0) || !(k * (along.squaredNorm() + turning.squaredNorm()) > kNegligible * own))
       return;
-    rows_.emplace_back();
-    ContactRow& row = rows_.back();
+    ContactRow& row = out.rows.emplace_back();
     copyFour(row.point, contact.point);
     row.solid = contact.solid;
     Eigen::Map<Eigen::Vector4d>(row.along) = along;
@@ -336,9 +356,9 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
 void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
 {
   // The terms of friction come after the normal ones and do not change, so that nothing is dragged along.
-  for (std::size_t k = 0; k < contacts_.size(); ++k)
+  for (std::size_t k = 0; k < found_.contacts.size(); ++k)
   {
-    ContactTerm& term = terms_[k];
+    ContactTerm& term = found_.terms[k];
     if (term.solid < 0 || surface_.solids[term.solid].body)
       continue;
     const Eigen::Vector3d motion =

@@ -10,6 +10,7 @@
 #include "barrier_stiffness.h"
 #include "candidates.h"
 #include "held_pieces.h"
+#include "linalg/parallel_for.h"
 #include "motion_shares.h"
 #include "slender_sim/contact/barrier.h"
 #include "slender_sim/contact/contact_surface.h"
@@ -43,6 +44,8 @@ class ContactPotential
 public:
   ContactPotential(ContactSurface surface, const ContactOptions& options);
   const ContactOptions& options() const { return options_; }
+  /// Threads for the pairs of large surfaces; 0: as OpenMP says. Results do not depend on it.
+  void setThreads(int threads) { threads_ = threads; }
 
   /// Takes the points, segments, triangles, and objects of another surface, which must be sound; the solids stay. For
   /// curves that are fed and divided while they move.
@@ -123,8 +126,8 @@ public:
   /// tangent since begin() [rad]. Null means that no segment has turned.
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns = nullptr);
-  const std::vector<ContactTerm>& terms() const { return terms_; }
-  const std::vector<ContactRow>& rows() const { return rows_; }
+  const std::vector<ContactTerm>& terms() const { return found_.terms; }
+  const std::vector<ContactRow>& rows() const { return found_.rows; }
   /// Adds to the normal forces of terms() what they gain, to first order, when the solids that move as prescribed go
   /// from `solids` to `solids_end`. Forces that would become smaller do not change. The last evaluate() must have
   /// computed the stiffness of the terms.
@@ -179,6 +182,25 @@ private:
     Eigen::Matrix3d last_stiffness = Eigen::Matrix3d::Zero();
   };
 
+  /// What adaptStiffness() and others need of a contact.
+  struct Measure
+  {
+    double energy;             ///< [J]
+    double gap, share;         ///< [m], and over the gap at which the pair repels
+    double force, stiffness;   ///< of the contact and its barrier [N]
+  };
+  /// What some of the candidates contribute, in their order.
+  struct Batch
+  {
+    std::vector<Contact> contacts;
+    std::vector<Measure> measures;   ///< of each contact
+    std::vector<ContactTerm> terms;
+    std::vector<ContactRow> rows;
+    bool meet = false;   ///< The surfaces of one of them meet.
+    void clear();
+    void append(const Batch& other);
+  };
+
   /// Normal force of a contact at the end of an iteration, as followFriction() predicts it [N].
   struct PredictedForce
   {
@@ -199,27 +221,39 @@ private:
   };
   void takeDisplacements(const Eigen::Matrix3Xd& x_end);
   bool movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
-  double addPair(const Eigen::Matrix3Xd& x, const GridPairs::Pair& pair, bool with_stiffness);
-  double addOnSolid(const Eigen::Matrix3Xd& x, const Candidates::OnSolid& on, const std::vector<Pose>& poses,
-                    bool with_stiffness);
-  double addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness);
-  double addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness);
-  double addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on, const std::vector<Pose>& poses,
-                         bool with_stiffness);
+  /// Calls f for one candidate; `number` counts them in the order of their lists.
+  template <class F>
+  static void visit(const Candidates& candidates, int number, F&& f);
+  static int count(const Candidates& candidates);
+  /// Calls f(first, last, batch) for ranges of `count` things, and sets found_ to all that they add to their batches,
+  /// or appends it. A range ends when things meet.
+  template <class F>
+  void inBatches(int count, F&& f);
+  /// A configuration that is evaluated.
+  struct Place
+  {
+    const Eigen::Matrix3Xd& x;
+    const std::vector<Pose>& poses;
+    bool with_stiffness;
+  };
+  bool add(const Place& place, const GridPairs::Pair& pair, Batch& out) const;
+  bool add(const Place& place, const Candidates::OnSolid& on, Batch& out) const;
+  bool add(const Place& place, const SheetCandidates::Pair& pair, Batch& out) const;
+  bool add(const Place& place, const SheetCandidates::OnSolid& on, Batch& out) const;
   /// Sets the place of a contact in the frame of the body that carries the first piece. Friction needs it.
   void setOwn(Contact& contact, const std::vector<Pose>& poses) const
   {
     if (const int carrier = surface_.objects[contact.object].carrier; carrier >= 0)
       contact.own = poses[carrier].inverse() * contact.position;
   }
-  /// `scale`: of the gap at which the pair repels.
-  double addContact(const Eigen::Matrix3Xd& x, const PairGap& gap, Contact& contact, double scale, bool with_stiffness);
+  /// `scale`: of the gap at which the pair repels. False: the pieces meet.
+  bool addContact(const Place& place, const PairGap& gap, Contact& contact, double scale, Batch& out) const;
   void setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const;
   void setLevers(Contact& contact) const;
   void listSegments();
   /// Appends a term of a contact, without its force.
-  ContactTerm& addTerm(const Contact& contact);
-  void addMotion(const PairGap& gap, const Contact& contact, double force, double own);
+  static ContactTerm& addTerm(const Contact& contact, Batch& out);
+  static void addMotion(const PairGap& gap, const Contact& contact, double force, double own, Batch& out);
   /// Share of the gap at which an object and a solid repel each other.
   double rangeOf(int object, int solid) const
   {
@@ -233,10 +267,9 @@ private:
   FrictionSpring springOf(const Contact& contact) const;
   bool turnsWithSolid(const Contact& contact) const;
   double spin(const Contact& contact, const std::vector<Pose>& poses) const;
-  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
-                     bool with_stiffness);
-  double addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, const Eigen::VectorXd* turns,
-                     Contact& contact, bool with_stiffness);
+  double addFriction(const Place& place, const Eigen::VectorXd* turns);
+  double addTerms(const Place& place, const Eigen::VectorXd* turns);
+  double addFriction(const Place& place, const Eigen::VectorXd* turns, Contact& contact, Batch& out) const;
   double restart();
 
   /// What thinToFit() made room for, and the distance [m] that remains forbidden there. Only this pair is thinner: a
@@ -295,9 +328,17 @@ private:
   {
     int point, other, solid = -1;
   };
+  Meeting meetingOf(const GridPairs::Pair& pair) const;
+  Meeting meetingOf(const Candidates::OnSolid& on) const;
+  Meeting meetingOf(const SheetCandidates::Pair& pair) const;
+  Meeting meetingOf(const SheetCandidates::OnSolid& on) const;
+  double limitOf(const SurfaceMotion& motion, const GridPairs::Pair& pair) const;
+  double limitOf(const SurfaceMotion& motion, const Candidates::OnSolid& on) const;
+  double limitOf(const SurfaceMotion& motion, const SheetCandidates::Pair& pair) const;
+  double limitOf(const SurfaceMotion& motion, const SheetCandidates::OnSolid& on) const;
   const Candidates& candidatesOf(const SurfaceMotion& motion);
-  template <class Take>
-  void forLimits(const SurfaceMotion& motion, Take&& take);
+  template <class Wanted, class Take>
+  void forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take);
   void setShared(const SurfaceMotion& motion, const MotionShares& shares);
   double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 
@@ -310,10 +351,11 @@ private:
   double h_ = 0.0;
   Eigen::Matrix3Xd x_begin_, x_now_;   ///< where the step begins; in the last evaluation
   std::vector<Pose> solids_begin_;
-  std::vector<Contact> contacts_, lagged_;
+  Batch found_;                  ///< in the last evaluation
+  std::vector<Batch> batches_;   ///< for inBatches()
+  std::vector<Contact> lagged_;
+  int threads_ = 1;
   std::vector<FrictionSpring> springs_;   ///< where the step begins; sorted
-  std::vector<ContactTerm> terms_;
-  std::vector<ContactRow> rows_;
   double smallest_gap_ = 0.0;
   bool following_ = false;   ///< see followFriction()
 
@@ -324,8 +366,11 @@ private:
   /// The change that lagFriction() without prediction returned last, and the share of the change of each force that
   /// the next call takes over.
   double last_change_ = kInfinity, relaxation_ = 1.0;
-  double shift_ = 0.0;   ///< constant of the potential, see followFriction() [J]
+  std::vector<double> rubbed_;   ///< energies of friction, for addTerms() [J]
+  double shift_ = 0.0;           ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
+  std::vector<double> limits_;        ///< for forLimits()
+  std::vector<RigidMotion> rigid_;    ///< likewise, per solid
   Eigen::Matrix3Xd shared_x_;         ///< for limitShares()
   std::vector<Pose> shared_solids_;   ///< likewise
   SheetPieces sheets_;
@@ -336,5 +381,34 @@ private:
   std::vector<int> order_;   ///< for clearance()
   std::vector<BoundingBox> boxes_;
 };
+
+template <class F>
+void ContactPotential::visit(const Candidates& candidates, int number, F&& f)
+{
+  const auto in = [&](const auto& list) {
+    const bool found = number < static_cast<int>(list.size());
+    found ? f(list[number]) : void(number -= static_cast<int>(list.size()));
+    return found;
+  };
+  in(candidates.pairs()) || in(candidates.onSolids()) || in(candidates.sheets().pairs()) ||
+      in(candidates.sheets().onSolids());
+}
+
+template <class F>
+void ContactPotential::inBatches(int count, F&& f)
+{
+  constexpr int kBatch = 256;   // Fewer pairs are done before another thread could help.
+  const int batches = threads_ == 1 ? 1 : (count + kBatch - 1) / kBatch;
+  if (batches <= 1)
+    return f(0, count, found_);
+  if (static_cast<int>(batches_.size()) < batches)
+    batches_.resize(batches);
+  parallelFor(threads_, batches, 1, [&](int k) {
+    batches_[k].clear();
+    f(kBatch * k, std::min(count, kBatch * (k + 1)), batches_[k]);
+  });
+  for (int k = 0; k < batches; ++k)
+    found_.append(batches_[k]);
+}
 
 }   // namespace slender

@@ -8,20 +8,9 @@
 
 namespace slender {
 
-double ContactPotential::addSheets(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool with_stiffness)
+bool ContactPotential::add(const Place& place, const SheetCandidates::Pair& pair, Batch& out) const
 {
-  double energy = 0.0;
-  for (const SheetCandidates::Pair& pair : near_.sheets().pairs())
-    if (energy += addSheetPair(x, pair, with_stiffness); !std::isfinite(energy))
-      return kInfinity;
-  for (const SheetCandidates::OnSolid& on : near_.sheets().onSolids())
-    if (energy += addSheetOnSolid(x, on, poses, with_stiffness); !std::isfinite(energy))
-      return kInfinity;
-  return energy;
-}
-
-double ContactPotential::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCandidates::Pair& pair, bool with_stiffness)
-{
+  const Eigen::Matrix3Xd& x = place.x;
   const double thickness = thicknessOf(pair), range = thickness + pair.scale * options_.gap;
   Contact contact;
   PairGap gap;
@@ -33,8 +22,8 @@ double ContactPotential::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCand
     const SheetPieces::Edge &a = sheets_.edges[pair.first], &b = sheets_.edges[pair.second];
     const Eigen::Vector3d a0 = x.col(a.a), a1 = x.col(a.b), b0 = x.col(b.a), b1 = x.col(b.b);
     if (segmentDistance(a0, a1, b0, b1) >= range)
-      return 0.0;
-    gap = edgesGap(a0, a1, b0, b1, thickness, with_stiffness);
+      return true;
+    gap = edgesGap(a0, a1, b0, b1, thickness, place.with_stiffness);
     contact.point[0] = a.a;
     contact.point[1] = a.b;
     contact.point[2] = b.a;
@@ -56,7 +45,7 @@ double ContactPotential::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCand
     radius = thickness * t.half_thickness / (p.radius + t.half_thickness);
   }
   if (gap.gap >= range - thickness)
-    return 0.0;
+    return true;
   // behind the pairs of segments, and segments on solids; points behind edges
   contact.first = static_cast<std::int64_t>(surface_.segments.size() + solids_.size()) + pair.first +
                   (pair.edges ? 0 : static_cast<std::int64_t>(sheets_.edges.size()));
@@ -68,27 +57,26 @@ double ContactPotential::addSheetPair(const Eigen::Matrix3Xd& x, const SheetCand
     contact.position -= gap.place[k] * x.col(contact.point[k]);
   contact.object = object;
   contact.other = other;
-  return addContact(x, gap, contact, pair.scale, with_stiffness);
+  return addContact(place, gap, contact, pair.scale, out);
 }
 
-double ContactPotential::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetCandidates::OnSolid& on,
-                                         const std::vector<Pose>& poses, bool with_stiffness)
+bool ContactPotential::add(const Place& place, const SheetCandidates::OnSolid& on, Batch& out) const
 {
   if (passes(on))
-    return 0.0;
-  const Pose& pose = poses[on.solid];
+    return true;
+  const Pose& pose = place.poses[on.solid];
   const SheetPieces::Face& face = on.face;
   const ConvexPiece& piece = solids_[on.solid].pieces[on.piece];
   const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
   Eigen::Vector3d z[3];
   for (int k = 0; k < face.corners; ++k)
-    z[k] = to_solid * Eigen::Vector3d(x.col(face.corner[k]) - pose.position);
+    z[k] = to_solid * Eigen::Vector3d(place.x.col(face.corner[k]) - pose.position);
   const double radius = thicknessOf(on);
   if (leastFaceDistance(piece, z, face.corners) >= radius + options_.gap)
-    return 0.0;
+    return true;
   PairGap gap = facePieceGap(z, face.corners, radius, piece);
   if (gap.gap >= options_.gap)
-    return 0.0;
+    return true;
   Contact contact;
   contact.first = static_cast<std::int64_t>(surface_.segments.size() + solids_.size() + sheets_.edges.size() +
                                             sheets_.points.size()) +
@@ -105,8 +93,8 @@ double ContactPotential::addSheetOnSolid(const Eigen::Matrix3Xd& x, const SheetC
   gap.normal = pose.orientation * gap.normal;
   contact.object = face.object;
   contact.other = -1;
-  setOwn(contact, poses);
-  return addContact(x, gap, contact, rangeOf(face.object, on.solid), with_stiffness);
+  setOwn(contact, place.poses);
+  return addContact(place, gap, contact, rangeOf(face.object, on.solid), out);
 }
 
 bool ContactPotential::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)

@@ -1,6 +1,7 @@
 // Friction of ContactPotential: normal forces of an earlier configuration, and springs that last from step to step.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 
 #include "contact_potential.h"
@@ -52,13 +53,14 @@ double ContactPotential::frictionOf(const Contact& contact) const
   return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
-double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
-                                     const Eigen::VectorXd* turns, Contact& contact, bool with_stiffness)
+double ContactPotential::addFriction(const Place& place, const Eigen::VectorXd* turns, Contact& contact,
+                                     Batch& out) const
 {
+  const std::vector<Pose>& poses = place.poses;
   const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   if (!(most > 0.0))
     return 0.0;
-  ContactTerm& term = addTerm(contact);
+  ContactTerm& term = addTerm(contact, out);
   Eigen::Vector3d u = Eigen::Vector3d::Zero();
   const int carrier = surface_.objects[contact.object].carrier;
   term.carried = carrier >= 0;
@@ -72,7 +74,7 @@ double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vecto
   }
   for (int i = 0; i < 4 && !term.carried; ++i)
     if (contact.point[i] >= 0)
-      u += term.moveBy(i, x.col(contact.point[i]) - x_begin_.col(contact.point[i]));
+      u += term.moveBy(i, place.x.col(contact.point[i]) - x_begin_.col(contact.point[i]));
   if (contact.solid >= 0)
   {
     term.position = poses[contact.solid] * contact.material;
@@ -91,7 +93,7 @@ double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vecto
   contact.tension = most * over_slip * slip;
   term.force = -contact.tension;
   term.slip_range = y < law.e ? law.e : 0.0;
-  if (with_stiffness)
+  if (place.with_stiffness)
   {
     // Where a contact slips, the tangent along the slip is zero: Newton's method may jump across the narrow range in
     // which it sticks, from slip in one direction to slip in the other, without end. So the direction of the force is
@@ -137,34 +139,39 @@ void ContactPotential::followFriction(const std::vector<Eigen::Vector3d>& moves)
   following_ = std::all_of(moves.begin(), moves.end(),
                            [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap_; });
   predicted_.clear();
-  for (std::size_t k = 0; following_ && k < contacts_.size(); ++k)   // The normal terms come first, in this order.
+  for (std::size_t k = 0; following_ && k < found_.contacts.size();
+       ++k)   // The normal terms come first, in this order.
   {
-    const Contact& c = contacts_[k];
-    const double size = c.force.norm(), change = -c.force.normalized().dot(terms_[k].stiffness * moves[k]);
+    const Contact& c = found_.contacts[k];
+    const double size = c.force.norm(), change = -c.force.normalized().dot(found_.terms[k].stiffness * moves[k]);
     predicted_.push_back({c.first, c.second, std::max(0.0, size + change)});
   }
 }
 
 /// Adds the friction of all contacts. Its normal forces are those of an earlier configuration or, if friction follows,
 /// predicted ones.
-double ContactPotential::addFriction(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses,
-                                     const Eigen::VectorXd* turns, bool with_stiffness)
+double ContactPotential::addFriction(const Place& place, const Eigen::VectorXd* turns)
 {
-  const auto sum = [&](bool stiffness) {
-    double energy = 0.0;
-    for (Contact& contact : lagged_)
-      energy += addFriction(x, poses, turns, contact, stiffness);
-    return energy;
-  };
-  if (!following_ || !with_stiffness || follows_left_ == 0)
-    return sum(with_stiffness) + shift_;
-  const std::size_t others = terms_.size();
-  const double before = sum(false) + shift_;
-  terms_.resize(others);
+  if (!following_ || !place.with_stiffness || follows_left_ == 0)
+    return addTerms(place, turns) + shift_;
+  const std::size_t others = found_.terms.size();
+  const double before = addTerms({place.x, place.poses, false}, turns) + shift_;
+  found_.terms.resize(others);
   if (lagFriction(kLagTolerance, true) > kLagTolerance)
     --follows_left_;
-  shift_ = before - sum(true);
+  shift_ = before - addTerms(place, turns);
   return before;
+}
+
+/// Adds the terms of friction of all contacts. Returns their energy [J].
+double ContactPotential::addTerms(const Place& place, const Eigen::VectorXd* turns)
+{
+  rubbed_.assign(lagged_.size(), 0.0);
+  inBatches(static_cast<int>(lagged_.size()), [&](int first, int last, Batch& out) {
+    for (int k = first; k < last; ++k)
+      rubbed_[k] = addFriction(place, turns, lagged_[k], out);
+  });
+  return std::accumulate(rubbed_.begin(), rubbed_.end(), 0.0);
 }
 
 /// Does not take the new forces over if they have changed by less than `least`. `predicted`: instead of present normal
@@ -178,7 +185,7 @@ double ContactPotential::lagFriction(double least, bool predicted)
   auto old = lagged_.begin();
   auto before = predicted_.begin();
   rubbing_.clear();
-  for (const Contact& present : contacts_)
+  for (const Contact& present : found_.contacts)
   {
     const double friction = frictionOf(present);
     if (!(friction > 0.0))

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "mesh_tree.h"
+#include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/contact/solids.h"
 
@@ -22,6 +23,7 @@ struct SurfaceMotion
 {
   const Eigen::Matrix3Xd &x, &x_end;
   const std::vector<Pose>&solids, &solids_end;
+  MovingPoint of(int point) const { return {x.col(point), x_end.col(point)}; }
 };
 
 /// Whether an object of a surface and one of its solids may touch.

@@ -16,6 +16,11 @@ enum class Approach
   squeezed   ///< could not move at all
 };
 
+/// The tolerance of increments where a solution with contact ends [-]. `gap`: of contact, over the shortest edge.
+/// Friction that is about to slip and contacts that run along a curve converge slowly at the end, far below what gaps
+/// resolve.
+inline double fineTolerance(const NewtonConfig& newton, double gap) { return std::max(newton.tolerance, 1e-3 * gap); }
+
 /// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a
 /// time step to `to`. They advance until contact blocks them; a solution lets the blocking parts give way; and so on.
 /// Then it solves at `to`, with friction forces from the previous solution, until these no longer change. `gap` is the
@@ -49,10 +54,8 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     }
     return r.ok();
   };
-  // Friction that is about to slip and contacts that run along a curve converge slowly at the end, far below what gaps
-  // resolve.
   NewtonConfig fine = newton, loose = newton;
-  fine.tolerance = std::max(newton.tolerance, 1e-3 * gap);
+  fine.tolerance = fineTolerance(newton, gap);
   fine.max_iterations = 2 * newton.max_iterations;   // contacts that come and go cost more than a substep cut in two
   // Each advance of what pushes is an iteration as well, so that few are needed between two of them. Where many
   // advances do not arrive, as in folds, each of them goes farther after a better solution.

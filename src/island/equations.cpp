@@ -23,14 +23,16 @@ void Equations::setParts(const std::vector<Part*>& parts)
 void Equations::setContact(ContactSurface surface, const ContactOptions& options)
 {
   contact_ = std::make_unique<ContactPotential>(std::move(surface), options);
+  contact_->setThreads(threads_);
   for (auto* poses : {&prescribed_, &poses_, &poses_base_, &poses_end_})
     poses->resize(solids.size());
 }
 
-void Equations::setThreads(int threads, bool parallel)
+void Equations::setThreads(int threads)
 {
   threads_ = threads;
-  parallel_ = parallel;
+  if (contact_)
+    contact_->setThreads(threads);
 }
 
 void Equations::countPoints()
@@ -72,8 +74,7 @@ void Equations::placeSolids(double fraction, std::vector<Pose>& poses) const
 
 void Equations::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const
 {
-  for (const Part* part : parts_)
-    part->gather(x);
+  forAllParts([&](const Part& part) { part.gather(x); });
   gatherSolids(poses);
 }
 
@@ -116,11 +117,9 @@ void Equations::unsettle()
 /// within the tolerance of positions in contact, so that the next one would be far smaller.
 void Equations::settle()
 {
-  constexpr double kArrived = 1e-3;   // of the gap
-  const double tolerance = kArrived * contact_->options().gap / tolerances.least_edge;
   for (Part* part : parts_)
   {
-    if (moved_fully_ && shift_.none() && isAlone(*part) && part->increment <= tolerance)
+    if (moved_fully_ && shift_.none() && isAlone(*part) && part->increment <= arrived_)
       part->settled = true;
     part->increment = kInfinity;
   }
@@ -203,7 +202,9 @@ NewtonResult Equations::solve(double from, double to, const NewtonConfig& newton
   placeSolids(to, prescribed_);
   gather(points_end_, poses_end_);
   contact_->letPass(points_base_, poses_base_, points_end_, poses_end_);
-  return minimizeConfined(*this, from, to, newton, contact_->options().gap / tolerances.least_edge);
+  const double gap = contact_->options().gap / tolerances.least_edge;
+  arrived_ = fineTolerance(newton, gap);
+  return minimizeConfined(*this, from, to, newton, gap);
 }
 
 void Equations::endStage()
@@ -288,8 +289,7 @@ void Equations::accept()
 
 void Equations::saveBase()
 {
-  for (Part* part : parts_)
-    part->saveBase();
+  forAllParts([](Part& part) { part.saveBase(); });
 }
 
 void Equations::restoreBase()

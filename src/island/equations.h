@@ -60,8 +60,8 @@ public:
   void setContact(ContactSurface surface, const ContactOptions& options);
   /// A potential of the surface points besides contact; null: none.
   void setAttraction(SurfacePotential* attraction) { attraction_ = attraction; }
-  /// Threads that evaluate parts; 0: as OpenMP says. `parallel`: the parts are large enough to be worth it.
-  void setThreads(int threads, bool parallel);
+  /// Threads that evaluate parts and contact; 0: as OpenMP says.
+  void setThreads(int threads);
   ContactPotential* contact() { return contact_.get(); }   ///< null: nothing touches
   const ContactPotential* contact() const { return contact_.get(); }
 
@@ -129,7 +129,9 @@ private:
   using Key = std::array<int, 7>;
 
   template <class F>
-  void forParts(F&& f);
+  void forAllParts(F&& f) const;
+  template <class F>
+  void forParts(F&& f) const;
   /// Calls f for all present contacts, and for the terms of the attraction.
   template <class F>
   void forTerms(F&& f) const;
@@ -174,8 +176,7 @@ private:
   void follow();
 
   std::vector<Part*> parts_;
-  int threads_ = 0;
-  bool parallel_ = false;
+  int threads_ = 1;
   double duration_ = 1.0;
 
   SharedMatrix matrix_;
@@ -205,6 +206,7 @@ private:
   Eigen::VectorXd turns_begin_, turns_base_, turns_;
   MotionShares shares_;
   double least_share_ = 1.0;   ///< of the direction that blocked parts may go
+  double arrived_ = 0.0;       ///< increment from which on a part may settle [-]
   bool moved_fully_ = false;   ///< The last moveAlong() went all of the way of what is not blocked.
   bool pushing_ = false;       ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap

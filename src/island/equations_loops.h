@@ -1,32 +1,25 @@
 #pragma once
 
 #include "island/equations.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include "linalg/parallel_for.h"
 
 /// Loops over the parts and the contacts of an island. Private to Equations.
 namespace slender {
 
+template <class F>
+void Equations::forAllParts(F&& f) const
+{
+  parallelFor(threads_, static_cast<int>(parts_.size()), 4, [&](int k) { f(*parts_[k]); });
+}
+
 /// Leaves out settled parts.
 template <class F>
-void Equations::forParts(F&& f)
+void Equations::forParts(F&& f) const
 {
-  if (!parallel_ || threads_ == 1)
-  {
-    for (Part* part : parts_)   // OpenMP would take memory for its one thread
-      if (!part->settled)
-        f(*part);
-    return;
-  }
-  const int count = static_cast<int>(parts_.size());
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads_ > 0 ? threads_ : omp_get_max_threads())
-#endif
-  for (int k = 0; k < count; ++k)
-    if (!parts_[k]->settled)
-      f(*parts_[k]);
+  forAllParts([&](Part& part) {
+    if (!part.settled)
+      f(part);
+  });
 }
 
 template <class F>

@@ -337,8 +337,7 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   if (contact_)
   {
     gather(points_, poses_);
-    for (const Part* part : parts_)
-      part->gatherTurns(turns_);
+    forAllParts([&](const Part& part) { part.gatherTurns(turns_); });
     turns_ -= turns_begin_;
     sum.potential = contact_->evaluate(points_, poses_, with_hessian, &turns_);
     if (!std::isfinite(sum.potential))

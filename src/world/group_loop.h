@@ -3,11 +3,8 @@
 #include <exception>
 #include <vector>
 
+#include "linalg/parallel_for.h"
 #include "slender_sim/dynamics/step_report.h"
-
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 namespace slender {
 
@@ -35,19 +32,7 @@ public:
         errors_[k] = std::current_exception();   // must not leave the parallel region
       }
     };
-    if (count == 1 || threads == 1 || nodes < kWorthThreads)
-    {
-      for (int k = 0; k < count; ++k)   // OpenMP would take memory for its one thread
-        stepOne(k);
-    }
-    else
-    {
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic) num_threads(threads > 0 ? threads : omp_get_max_threads())
-#endif
-      for (int k = 0; k < count; ++k)
-        stepOne(k);
-    }
+    parallelFor(nodes < kWorthThreads ? 1 : threads, count, 1, stepOne);
     for (const std::exception_ptr& error : errors_)
       if (error)
         std::rethrow_exception(error);

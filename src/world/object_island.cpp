@@ -89,7 +89,7 @@ bool ObjectIsland::isLarge() const
   return rods_.size() > 1 && nodes_ >= kWorthThreads;
 }
 
-void ObjectIsland::setThreads(int threads) { island_.equations().setThreads(threads, isLarge()); }
+void ObjectIsland::setThreads(int threads) { island_.equations().setThreads(isLarge() ? threads : 1); }
 
 /// The solids that move as prescribed, and those that its parts carry or lie on.
 std::vector<ContactSolid> ObjectIsland::takeSolids()

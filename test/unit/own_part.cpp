@@ -197,6 +197,41 @@ TEST(OwnPart, MeshesChangeAfterAllPartsHaveMoved)
   EXPECT_EQ(calls, "ffmm");
 }
 
+/// A ball that counts how often Newton's method evaluates it.
+class CountingBall final : public SpringBall
+{
+public:
+  int evaluations = 0;
+  using SpringBall::SpringBall;
+  void evaluate(bool with_hessian, const HessianShift& shift) override
+  {
+    ++evaluations;
+    SpringBall::evaluate(with_hessian, shift);
+  }
+};
+
+/// What touches nothing arrives after a few iterations. Then it is left alone, and contact elsewhere goes on.
+TEST(OwnPart, SettlesWhileOthersTouch)
+{
+  CountingBall alone({0, 0, 0.5}), upper({1, 0, 0.041}), lower({1, 0, 0});
+  upper.v = {0, 0, -3};
+  upper.gravity = lower.gravity.setZero();
+  ClothIsland island(kIslandStep, kIslandGap);
+  island.others = {&alone, &upper, &lower};
+  double v = 0.0, z = 0.5;
+  for (int k = 0; k < 5; ++k)
+  {
+    step(island);
+    v = (v - kIslandStep * (9.81 + alone.stiffness / alone.mass * (z - 0.5))) /
+        (1.0 + kIslandStep * kIslandStep * alone.stiffness / alone.mass);
+    z += kIslandStep * v;
+    EXPECT_NEAR(alone.x.z(), z, 1e-12);   // round-off: its equation is linear
+  }
+  EXPECT_LT(lower.v.z(), -0.5);
+  EXPECT_GT(lower.evaluations, 50);
+  EXPECT_LT(alone.evaluations, lower.evaluations / 2);
+}
+
 /// It flies against a rod and a cloth. What it loses they gain, up to Newton's tolerance, and nothing passes through.
 TEST(OwnPart, SharesAnIslandWithARodAndACloth)
 {

@@ -1,0 +1,27 @@
+#pragma once
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+namespace slender {
+
+/// Calls f(k) for 0 <= k < count, in any order, on this many threads; 0: as OpenMP says. A thread takes `chunk` numbers
+/// at a time. Nothing may be thrown.
+template <class F>
+void parallelFor(int threads, int count, [[maybe_unused]] int chunk, F&& f)
+{
+  if (threads == 1 || count == 1)
+  {
+    for (int k = 0; k < count; ++k)   // OpenMP would take memory for its one thread
+      f(k);
+    return;
+  }
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic, chunk) num_threads(threads > 0 ? threads : omp_get_max_threads())
+#endif
+  for (int k = 0; k < count; ++k)
+    f(k);
+}
+
+}   // namespace slender

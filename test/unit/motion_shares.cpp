@@ -1,0 +1,144 @@
+// How far parts of a surface may go that move independently of each other (ContactPotential::limitShares).
+#include <gtest/gtest.h>
+
+#include "test/support/contact.h"
+
+namespace slender::test {
+namespace {
+
+Eigen::Matrix3Xd stick(const Eigen::Vector3d& from, const Eigen::Vector3d& along)
+{
+  Eigen::Matrix3Xd nodes(3, 4);
+  for (int i = 0; i < 4; ++i)
+    nodes.col(i) = from + 0.1 * i * along;
+  return nodes;
+}
+
+/// Sticks, each a mover, that go along straight lines.
+struct Sticks
+{
+  ContactSurface surface;
+  Eigen::Matrix3Xd x, x_end;
+  MotionShares shares;
+
+  void add(const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& way)
+  {
+    const int mover = static_cast<int>(surface.objects.size());
+    addCurve(surface, x, nodes, 0.5 * kCurveRadius);
+    x_end.conservativeResize(3, x.cols());
+    x_end.rightCols(4) = nodes.colwise() + way;
+    shares.of_point.insert(shares.of_point.end(), 4, mover);
+    shares.blocked.push_back(0);
+  }
+  ContactPotential limit()
+  {
+    ContactOptions options;
+    options.gap = kContactGap;
+    ContactPotential potential(surface, options);
+    potential.limitShares({x, x_end, {}, {}}, shares);
+    return potential;
+  }
+};
+
+TEST(MotionShares, WhatIsBlockedDoesNotStopWhatIsFree)
+{
+  Sticks sticks;
+  sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, 0.2});   // towards the next one
+  sticks.add(stick({0.1, -0.1, 0.2}, {0, 1, 0}), {0, 0, 0});
+  sticks.add(stick({0, 0, 5}, {1, 0, 0}), {0, 0, 1});
+  sticks.limit();
+  EXPECT_TRUE(sticks.shares.isBlocked(0));
+  EXPECT_TRUE(sticks.shares.isBlocked(1));
+  EXPECT_FALSE(sticks.shares.isBlocked(2));
+  EXPECT_GT(sticks.shares.share, 0.5);   // four fifths of 0.15 m
+  EXPECT_LT(sticks.shares.share, 0.8);
+}
+
+/// A stick follows another one at its distance. If the first one is blocked, the second one must wait, too.
+TEST(MotionShares, WhatFollowsABlockedMoverIsBlocked)
+{
+  Sticks sticks;
+  sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.add(stick({0.1, -0.1, 0.2}, {0, 1, 0}), {0, 0, 0});
+  sticks.add(stick({0, 0, -0.1}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.add(stick({0, 0, -0.2}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.limit();
+  for (int mover = 0; mover < 4; ++mover)
+    EXPECT_TRUE(sticks.shares.isBlocked(mover)) << mover;
+}
+
+/// In heaps of sticks that fly about, all go their shares without meeting, and the share of the blocked ones is the one
+/// of the whole heap.
+TEST(MotionShares, NothingMeetsInRandomHeaps)
+{
+  Random random(11);
+  int partly = 0;
+  for (int trial = 0; trial < 200; ++trial)
+  {
+    Sticks sticks;
+    for (int k = 0; k < 12; ++k)
+      sticks.add(stick({0.12 * (k / 4), 0.12 * (k % 4), 0}, {0, 0, 1}), random.vector(0.05));
+    ContactPotential potential = sticks.limit();
+    const double whole = potential.stepLimit(sticks.x, sticks.x_end, {}, {});
+    ASSERT_EQ(sticks.shares.share, whole) << trial;
+    const auto free = std::count(sticks.shares.blocked.begin(), sticks.shares.blocked.end(), 0);
+    partly += free > 0 && whole < 1.0;
+    for (int step = 1; step <= 10; ++step)   // places on the way
+    {
+      Eigen::Matrix3Xd at = sticks.x;
+      for (Eigen::Index i = 0; i < at.cols(); ++i)
+        at.col(i) += 0.1 * step * sticks.shares.of(sticks.shares.of_point[i]) * (sticks.x_end.col(i) - at.col(i));
+      ASSERT_GT(potential.clearance(at, {}), 0.0) << trial;
+    }
+  }
+  EXPECT_GT(partly, 50);
+}
+
+/// Motions that are not finite stop everything.
+TEST(MotionShares, StopAtWhatIsNotFinite)
+{
+  Sticks sticks;
+  sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, std::nan("")});
+  sticks.add(stick({0, 0, 5}, {1, 0, 0}), {0, 0, 0});
+  sticks.limit();
+  EXPECT_EQ(sticks.shares.share, 0.0);
+  EXPECT_TRUE(sticks.shares.isBlocked(1));
+}
+
+/// Energies, terms and limits of a large heap have the same bits on one thread and on several.
+TEST(MotionShares, ThreadsDoNotChangeContact)
+{
+  Random random(12);
+  ContactSurface surface;
+  Eigen::Matrix3Xd x;
+  for (int k = 0; k < 400; ++k)
+    addCurve(surface, x, stick({0.06 * (k / 20), 0.06 * (k % 20), 0}, {0, 0, 1}), 0.5 * kCurveRadius, 0.3);
+  ContactOptions options;
+  options.gap = kContactGap;
+  ContactPotential one(surface, options), many(surface, options);
+  many.setThreads(3);
+  Eigen::Matrix3Xd end = x;
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    end(i) += random.uniform(-0.005, 0.005);
+  for (ContactPotential* potential : {&one, &many})
+  {
+    potential->setStiffness(1.0);
+    potential->begin(x, {}, 1e-3);
+  }
+  ASSERT_EQ(one.stepLimit(x, end, {}, {}), many.stepLimit(x, end, {}, {}));
+  const Eigen::Matrix3Xd at = x + 0.5 * one.stepLimit(x, end, {}, {}) * (end - x);
+  ASSERT_EQ(one.evaluate(at, {}, true), many.evaluate(at, {}, true));
+  ASSERT_GT(one.terms().size(), 2000u);   // more than one batch, with friction
+  ASSERT_EQ(one.terms().size(), many.terms().size());
+  ASSERT_EQ(one.smallestGap(), many.smallestGap());
+  ASSERT_EQ(one.stiffness(7), many.stiffness(7));
+  for (std::size_t i = 0; i < one.terms().size(); ++i)
+  {
+    ASSERT_EQ(one.terms()[i].force, many.terms()[i].force) << i;
+    ASSERT_EQ(one.terms()[i].stiffness, many.terms()[i].stiffness) << i;
+    ASSERT_EQ(one.terms()[i].point[3], many.terms()[i].point[3]) << i;
+  }
+}
+
+}   // namespace
+}   // namespace slender::test
