@@ -269,10 +269,10 @@ double Equations::roomToTrial()
   return contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
 }
 
-/// Parts that contact does not block go all of their way.
+/// If stepLimit() has found blocked parts, `alpha` is how far these go, and the others go farther in proportion.
 void Equations::moveAlong(double alpha)
 {
-  const double others = alpha > 0.0 ? std::min(1.0, alpha / least_share_) : 0.0;
+  const double others = alpha > 0.0 && least_share_ < 1.0 ? std::min(1.0, alpha / least_share_) : alpha;
   moved_fully_ = others == 1.0;
   forParts([&](Part& part) { part.moveAlong(shares_.isBlocked(part.number) ? alpha : others); });
   follow();
@@ -281,6 +281,7 @@ void Equations::moveAlong(double alpha)
 void Equations::accept()
 {
   forParts([](Part& part) { part.accept(); });
+  least_share_ = 1.0;   // The direction is used up.
   if (!contact_)
     return;
   settle();

@@ -397,7 +397,6 @@ void Equations::solve()
     if (!part.coupled)
       part.solve();
   });
-  least_share_ = 1.0;
   spread();
   if (contact_)
     measureContacts();
