@@ -66,7 +66,7 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   }
   if (!sheets.empty())
     sheets_.build(surface, sheets, solids, motion, {gap, margin, shift_, turn_});
-  sheets_kept_ = !sheets.empty();
+  has_triangles_ = !sheets.empty();
   built_ = true;
 }
 
@@ -132,7 +132,7 @@ bool Candidates::holdsFor(const Eigen::Matrix3Xd& x, const std::vector<Pose>& so
 {
   if (!built_)
     return false;
-  if (sheets_kept_)   // their volumes move with the mean of the motion
+  if (has_triangles_)   // which hold only where all points are near one instant of the motion
   {
     const double length2 = way_.squaredNorm();   // of the way of all points
     const double t = length2 > 0.0 ? std::clamp((x - start_).cwiseProduct(way_).sum() / length2, 0.0, 1.0) : 0.0;

@@ -22,6 +22,7 @@ public:
 
   /// Finds all pairs that may come within `gap` of each other while all points are at one instant of the motion, but
   /// for at most `margin` [m] in each coordinate, and solids leave the motion by at most `margin` and `turn` [rad].
+  /// Without triangles each point may be anywhere in the box of its own motion, enlarged by the margin.
   void build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
              const Motion& motion, double gap, double margin, double turn);
   /// Forgets everything: the surface has other pieces from now on.
@@ -43,10 +44,10 @@ private:
   void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
                    double gap, double margin);
 
-  bool built_ = false, sheets_kept_ = false;
+  bool built_ = false, has_triangles_ = false;
   double margin_ = 0.0;
   Eigen::Matrix3Xd start_, way_;   ///< of points: where the motion starts, and how far it leads
-  Eigen::Matrix3Xd low_, high_;
+  Eigen::Matrix3Xd low_, high_;    ///< boxes of points
   std::vector<Pose> solids_;
   std::vector<double> shift_, turn_;   ///< from solids_ up to which the candidates hold
   std::vector<BoundingBox> boxes_;

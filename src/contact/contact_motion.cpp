@@ -9,7 +9,7 @@
 
 namespace slender {
 
-/// The pairs that surfaces may meet in during a motion.
+/// Returns candidates that hold for the whole motion, and finds them anew if none that are known do.
 const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
 {
   for (const Candidates* known : {&near_, &swept_})
@@ -129,8 +129,10 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   return share;
 }
 
-/// Two blocked movers go the same share of their ways. So do two others, which go all of them. Pairs of one kind and
-/// the other are examined again, with the ways that they go: if they would meet, both are blocked.
+/// The limits of the whole motion suffice for two blocked movers, which go the same share of it, and for two free ones,
+/// which go all of it. A blocked and a free mover are examined again with the motions that they then make. If they
+/// would meet, the free one is blocked, too. All movers are blocked after several rounds, and where there are
+/// triangles, because candidates of triangles hold for one common motion only.
 void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& shares)
 {
   constexpr int kMostRounds = 4;
@@ -157,7 +159,7 @@ void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& sh
     const auto free = std::find(shares.blocked.begin(), shares.blocked.end(), 0);
     if (free == shares.blocked.end())
       return;
-    if (round == kMostRounds || !finite)
+    if (round == kMostRounds || !finite || !sheets_.empty())
       return std::fill(free, shares.blocked.end(), 1);
     setShared(motion, shares);
     bool met = false;

@@ -343,6 +343,8 @@ void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, dou
 void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h)
 {
   lagged_.clear();
+  shared_x_.resizeLike(x);   // A warm step takes no memory.
+  shared_solids_.resize(solids.size());
   x_begin_ = x;
   solids_begin_ = solids;
   h_ = h;

@@ -108,8 +108,8 @@ public:
   /// surfaces meet at x.
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
-  /// The same, where movers that are not blocked go all of their ways. `shares` begins with the movers that are blocked
-  /// anyway. Adds those that would meet something, and sets the share of all of them.
+  /// The same for movers that may go different shares. On entry shares.blocked marks movers that count as blocked
+  /// whatever they meet. Marks all others that would meet something, and sets the share that the blocked ones go.
   void limitShares(const SurfaceMotion& motion, MotionShares& shares);
 
   /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
@@ -225,8 +225,8 @@ private:
   template <class F>
   static void visit(const Candidates& candidates, int number, F&& f);
   static int count(const Candidates& candidates);
-  /// Calls f(first, last, batch) for ranges of `count` things, and sets found_ to all that they add to their batches,
-  /// or appends it. A range ends when things meet.
+  /// Calls f(first, last, batch) for consecutive ranges of 0 ... count-1, and appends what they add to found_, in this
+  /// order.
   template <class F>
   void inBatches(int count, F&& f);
   /// A configuration that is evaluated.
@@ -323,7 +323,8 @@ private:
   {
     return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
   }
-  /// Points, one of each piece that may meet another one, or a point and a solid.
+  /// One point of each piece of a pair, or a point of the piece and the number of the solid. They tell which movers may
+  /// meet.
   struct Meeting
   {
     int point, other, solid = -1;

@@ -139,8 +139,8 @@ void ContactPotential::followFriction(const std::vector<Eigen::Vector3d>& moves)
   following_ = std::all_of(moves.begin(), moves.end(),
                            [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap_; });
   predicted_.clear();
-  for (std::size_t k = 0; following_ && k < found_.contacts.size();
-       ++k)   // The normal terms come first, in this order.
+  // The normal terms come first, in the order of the contacts.
+  for (std::size_t k = 0; following_ && k < found_.contacts.size(); ++k)
   {
     const Contact& c = found_.contacts[k];
     const double size = c.force.norm(), change = -c.force.normalized().dot(found_.terms[k].stiffness * moves[k]);

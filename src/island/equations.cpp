@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "island/equations_loops.h"
 
@@ -15,9 +14,6 @@ void Equations::setParts(const std::vector<Part*>& parts)
 {
   parts_valid_ = parts_valid_ && parts == parts_;
   parts_ = parts;
-  for (std::size_t k = 0; k < parts_.size(); ++k)
-    parts_[k]->number = static_cast<int>(k);
-  shares_.blocked.assign(parts_.size(), 1);
 }
 
 void Equations::setContact(ContactSurface surface, const ContactOptions& options)
@@ -109,18 +105,26 @@ void Equations::unsettle()
   for (Part* part : parts_)
   {
     part->settled = false;
+    part->has_direction = true;
     part->increment = kInfinity;
   }
 }
 
-/// Parts that have arrived need no more iterations, while those that touch others still do. Their last increment was
-/// within the tolerance of positions in contact, so that the next one would be far smaller.
+/// A part settles if its last increment was a full one of Newton's method and within the tolerance at which a solution
+/// ends, because the next increment would be far smaller. Threads never settle: small increments do not tell that their
+/// forces are balanced.
 void Equations::settle()
 {
+  const bool may_settle = moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced);
   for (Part* part : parts_)
   {
-    if (moved_fully_ && shift_.none() && isAlone(*part) && part->increment <= arrived_)
+    if (may_settle && !part->settled && isAlone(*part) && !shares_.isBlocked(part->number) &&
+        part->increment <= arrived_ && part->evaluation.inertia.positiveDefinite())
+    {
       part->settled = true;
+      part->moveAlong(0.0);   // makes the trial complete, which remains the one that others see
+      part->evaluate(false, {});
+    }
     part->increment = kInfinity;
   }
 }
@@ -152,7 +156,8 @@ void Equations::advance(double to)
       solve();
       double alpha = 1.0;
       for (const Part* part : parts_)
-        alpha = std::min(alpha, part->stepLimit());
+        if (!part->settled)
+          alpha = std::min(alpha, part->stepLimit());
       forParts([&](Part& part) { part.moveAlong(alpha); });
     }
   }
@@ -164,6 +169,10 @@ void Equations::advance(double to)
 void Equations::beginSubstep(double fraction)
 {
   exact_ = false;
+  for (std::size_t k = 0; k < parts_.size(); ++k)   // another island has numbered them differently
+    parts_[k]->number = static_cast<int>(k);
+  shares_.blocked.assign(parts_.size(), 1);
+  least_share_ = 1.0;
   for (Part* part : parts_)
   {
     parts_valid_ = parts_valid_ && part->island == this;   // another island has numbered its unknowns
@@ -274,7 +283,10 @@ void Equations::moveAlong(double alpha)
 {
   const double others = alpha > 0.0 && least_share_ < 1.0 ? std::min(1.0, alpha / least_share_) : alpha;
   moved_fully_ = others == 1.0;
-  forParts([&](Part& part) { part.moveAlong(shares_.isBlocked(part.number) ? alpha : others); });
+  forParts([&](Part& part) {
+    if (part.has_direction)
+      part.moveAlong(shares_.isBlocked(part.number) ? alpha : others);
+  });
   follow();
 }
 
@@ -302,7 +314,8 @@ void Equations::restoreBase()
 
 // ---- measures
 
-/// Coupled parts go the same share of the direction, because that of one part suits those of the others alone.
+/// Coupled parts go the same share of the direction, because the direction of each was computed together with those of
+/// the others.
 double Equations::stepLimit()
 {
   double alpha = 1.0;
@@ -384,7 +397,8 @@ double Equations::residual() const
 {
   double largest = 0.0;
   for (const Part* part : parts_)
-    largest = std::max(largest, part->residual());
+    if (!part->settled)
+      largest = std::max(largest, part->residual());
   return largest;
 }
 

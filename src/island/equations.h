@@ -205,10 +205,11 @@ private:
   /// since the stage began [rad].
   Eigen::VectorXd turns_begin_, turns_base_, turns_;
   MotionShares shares_;
-  double least_share_ = 1.0;   ///< of the direction that blocked parts may go
-  double arrived_ = 0.0;       ///< increment from which on a part may settle [-]
-  bool moved_fully_ = false;   ///< The last moveAlong() went all of the way of what is not blocked.
-  bool pushing_ = false;       ///< contact exerts the forces that it will exert once solids are at poses_end_
+  double least_share_ = 1.0;   ///< of the direction that blocked parts go, found by stepLimit()
+  double arrived_ = 0.0;       ///< largest increment of a part that may settle [-]
+  /// The last direction was computed without a shift, and parts that are not blocked went all of it.
+  bool by_newton_ = false, moved_fully_ = false;
+  bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
   /// Largest relative motion of touching surfaces by the direction: of all contacts [m], and of contacts that stick, as

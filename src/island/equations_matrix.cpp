@@ -383,6 +383,9 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
 
 void Equations::solve()
 {
+  by_newton_ = shift_.none();
+  for (Part* part : parts_)
+    part->has_direction = !part->settled;
   const bool solved = matrix_.solve();
   linear_iterations_ += matrix_.linearIterations();
   if (!solved)

@@ -25,11 +25,13 @@ struct PartInIsland
   bool coupled = false;           ///< the matrix of the island has its unknowns
   int offset = 0;                 ///< number of its first unknown in that matrix
   int block = 0;                  ///< number of its block of that matrix
-  /// Newton's method has arrived for the part, which nothing couples or touches. It is left alone until that changes.
+  /// Newton's method has converged for the part, and nothing couples or touches it. It is neither evaluated nor moved
+  /// until something comes near, or what is prescribed moves.
   bool settled = false;
-  double increment = 0.0;                      ///< incrementSize() of the present direction
-  int number = 0;                              ///< among the parts of the island
-  int first_point = 0;                         ///< number of its first surface point among those of the island
+  bool has_direction = true;   ///< of the present iteration; none: it was settled when directions were computed
+  double increment = 0.0;      ///< incrementSize() of the present direction
+  int number = 0;              ///< among the parts of the island
+  int first_point = 0;         ///< number of its first surface point among those of the island
   std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
   std::vector<const ContactRow*> own_rows;     ///< likewise
   RodEvaluation evaluation;                    ///< result of the last evaluate()

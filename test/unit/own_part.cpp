@@ -232,6 +232,46 @@ TEST(OwnPart, SettlesWhileOthersTouch)
   EXPECT_LT(alone.evaluations, lower.evaluations / 2);
 }
 
+/// Twists a straight rod at one end, beside two balls of which one flies at the other with this speed [m/s]. Returns
+/// the twist.
+Eigen::VectorXd twistBeside(double speed, int& evaluations)
+{
+  CountingBall above({1, 0, 0.041}), below({1, 0, 0});
+  above.v = {0, 0, -speed};
+  above.gravity = below.gravity.setZero();
+  ClothIsland island(kIslandStep, kIslandGap);
+  island.gravity.setZero();
+  island.others = {&above, &below};
+  const Matrix3Xd nodes = straightNodes(9, 0.4, {0, 0, 0});
+  const auto rod = std::make_shared<RodModel>(openRod(nodes, roundSection(4e-3, 1e6, 1000.0)));
+  RodState state = makeRodState(*rod, nodes, Vector3d::Zero());
+  for (const int edge : {0, 7})
+    state.grasps.push_back(makeGrasp(*rod, state, edge, edge + 1, true));
+  island.addRod(rod, state);
+  for (int k = 0; k < 4; ++k)
+  {
+    island.rods[0].inputs.grasps.clear();
+    for (const GraspState& grasp : state.grasps)
+      island.rods[0].inputs.grasps.push_back({grasp.X_WG, {}});
+    island.rods[0].inputs.grasps[1].X_WG.orientation =
+        Eigen::AngleAxisd(0.1 * k, Vector3d::UnitX()) * state.grasps[1].X_WG.orientation;
+    step(island);
+  }
+  evaluations = below.evaluations;
+  return island.rods[0].state.twist;
+}
+
+/// The rod needs one iteration a step. It settles with its twist, while the balls touch and go on.
+TEST(OwnPart, ARodSettlesWithItsTwist)
+{
+  int few = 0, many = 0;
+  const Eigen::VectorXd alone = twistBeside(0.0, few), beside = twistBeside(3.0, many);
+  EXPECT_GT(many, few + 10);
+  ASSERT_GT(alone.size(), 0);
+  EXPECT_NEAR(alone.sum(), 0.3, 1e-9);
+  EXPECT_LT((alone - beside).cwiseAbs().maxCoeff(), 1e-9);   // the equation of the twist is linear
+}
+
 /// It flies against a rod and a cloth. What it loses they gain, up to Newton's tolerance, and nothing passes through.
 TEST(OwnPart, SharesAnIslandWithARodAndACloth)
 {
