@@ -129,10 +129,10 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   return share;
 }
 
-/// The limits of the whole motion suffice for two blocked movers, which go the same share of it, and for two free ones,
-/// which go all of it. A blocked and a free mover are examined again with the motions that they then make. If they
-/// would meet, the free one is blocked, too. All movers are blocked after several rounds, and where there are
-/// triangles, because candidates of triangles hold for one common motion only.
+/// Two blocked movers go the same share of the motion, and two free movers go all of it. The limits of the whole motion
+/// therefore hold for both kinds of pairs. A blocked and a free mover are examined again with the motions that they
+/// then make. If they would meet, the free one is blocked, too. All movers are blocked after several rounds, and where
+/// there are triangles, because candidates of triangles hold for one common motion only.
 void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& shares)
 {
   constexpr int kMostRounds = 4;

@@ -108,8 +108,9 @@ public:
   /// surfaces meet at x.
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
-  /// The same for movers that may go different shares. On entry shares.blocked marks movers that count as blocked
-  /// whatever they meet. Marks all others that would meet something, and sets the share that the blocked ones go.
+  /// Finds the same limit for movers that may go different shares of the motion. On entry, shares.blocked marks the
+  /// movers that count as blocked even if they meet nothing. The function also marks the movers that would meet
+  /// something, and sets the share of the motion that blocked movers may go.
   void limitShares(const SurfaceMotion& motion, MotionShares& shares);
 
   /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
@@ -182,21 +183,21 @@ private:
     Eigen::Matrix3d last_stiffness = Eigen::Matrix3d::Zero();
   };
 
-  /// What adaptStiffness() and others need of a contact.
+  /// The quantities of a contact that are summed or compared over all contacts.
   struct Measure
   {
     double energy;             ///< [J]
-    double gap, share;         ///< [m], and over the gap at which the pair repels
-    double force, stiffness;   ///< of the contact and its barrier [N]
+    double gap, share;         ///< the gap [m], and its ratio to the gap at which the pair repels
+    double force, stiffness;   ///< normal force, and stiffness of the barrier [N]
   };
-  /// What some of the candidates contribute, in their order.
+  /// The contacts of a range of candidates, in the order of the candidates.
   struct Batch
   {
     std::vector<Contact> contacts;
     std::vector<Measure> measures;   ///< of each contact
     std::vector<ContactTerm> terms;
     std::vector<ContactRow> rows;
-    bool meet = false;   ///< The surfaces of one of them meet.
+    bool meet = false;   ///< The surfaces of one candidate meet.
     void clear();
     void append(const Batch& other);
   };
@@ -246,7 +247,8 @@ private:
     if (const int carrier = surface_.objects[contact.object].carrier; carrier >= 0)
       contact.own = poses[carrier].inverse() * contact.position;
   }
-  /// `scale`: of the gap at which the pair repels. False: the pieces meet.
+  /// Adds a contact if its gap is small enough. `scale`: the share of the gap at which the pair repels. Returns false
+  /// if the pieces meet.
   bool addContact(const Place& place, const PairGap& gap, Contact& contact, double scale, Batch& out) const;
   void setTurns(const Eigen::Matrix3Xd& x, Contact& contact) const;
   void setLevers(Contact& contact) const;

@@ -205,7 +205,7 @@ private:
   /// since the stage began [rad].
   Eigen::VectorXd turns_begin_, turns_base_, turns_;
   MotionShares shares_;
-  double least_share_ = 1.0;   ///< of the direction that blocked parts go, found by stepLimit()
+  double least_share_ = 1.0;   ///< share of the direction that blocked parts go; set by stepLimit()
   double arrived_ = 0.0;       ///< largest increment of a part that may settle [-]
   /// The last direction was computed without a shift, and parts that are not blocked went all of it.
   bool by_newton_ = false, moved_fully_ = false;
