@@ -27,23 +27,26 @@ const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
 
 ContactPotential::Meeting ContactPotential::meetingOf(const GridPairs::Pair& pair) const
 {
-  return {surface_.segments[pair.first].a, surface_.segments[pair.second].a};
+  const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
+  return {a.a, b.a, -1, (a.driven | b.driven) != 0};
 }
 
 ContactPotential::Meeting ContactPotential::meetingOf(const Candidates::OnSolid& on) const
 {
-  return {surface_.segments[on.segment].a, -1, on.solid};
+  const ContactSegment& s = surface_.segments[on.segment];
+  return {s.a, -1, on.solid, s.driven != 0};
 }
 
+// Where there are triangles, all that moves as prescribed is blocked anyway.
 ContactPotential::Meeting ContactPotential::meetingOf(const SheetCandidates::Pair& pair) const
 {
-  return pair.edges ? Meeting{sheets_.edges[pair.first].a, sheets_.edges[pair.second].a}
-                    : Meeting{sheets_.points[pair.first].point, surface_.triangles[pair.second].corner[0]};
+  return pair.edges ? Meeting{sheets_.edges[pair.first].a, sheets_.edges[pair.second].a, -1, false}
+                    : Meeting{sheets_.points[pair.first].point, surface_.triangles[pair.second].corner[0], -1, false};
 }
 
 ContactPotential::Meeting ContactPotential::meetingOf(const SheetCandidates::OnSolid& on) const
 {
-  return {on.face.corner[0], -1, on.solid};
+  return {on.face.corner[0], -1, on.solid, false};
 }
 
 // ---- the share of a motion that a pair may go
@@ -130,22 +133,21 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
 }
 
 /// Two blocked movers go the same share of the motion, and two free movers go all of it. The limits of the whole motion
-/// therefore hold for both kinds of pairs. A blocked and a free mover are examined again with the motions that they
-/// then make. If they would meet, the free one is blocked, too. All movers are blocked after several rounds, and where
-/// there are triangles, because candidates of triangles hold for one common motion only.
+/// therefore hold for both kinds of pairs. A pair of a blocked and a free mover is examined again with the motions that
+/// they then make. If they would meet, both are blocked. All movers are blocked after several rounds, and where there
+/// are triangles, because candidates of triangles hold for one common motion only.
 void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& shares)
 {
   constexpr int kMostRounds = 4;
   check(motion.x, motion.solids);
   check(motion.x_end, motion.solids_end);
   const bool finite = motion.x.allFinite() && motion.x_end.allFinite();
-  const auto moverOf = [&](const Meeting& m) {
-    return m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other];
-  };
   shares.share = finite ? 1.0 : 0.0;
   const auto block = [&](const Meeting& m) {
     shares.block(shares.of_point[m.point]);
-    shares.block(moverOf(m));
+    shares.block(m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other]);
+    if (m.driven)
+      shares.block(MotionShares::kPrescribed);
   };
   if (finite)
     forLimits(
@@ -154,35 +156,56 @@ void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& sh
           shares.share = std::min(shares.share, limit);
           block(m);
         });
-  for (int round = 0; shares.share < 1.0; ++round)
+  for (int round = 0; shares.share < 1.0 && shares.anyFree(); ++round)
   {
-    const auto free = std::find(shares.blocked.begin(), shares.blocked.end(), 0);
-    if (free == shares.blocked.end())
-      return;
     if (round == kMostRounds || !finite || !sheets_.empty())
-      return std::fill(free, shares.blocked.end(), 1);
+      return shares.blockAll();
     setShared(motion, shares);
     bool met = false;
-    const auto differ = [&](const Meeting& m) {
-      return moverOf(m) != MotionShares::kPrescribed &&
-             shares.isBlocked(shares.of_point[m.point]) != shares.isBlocked(moverOf(m));
-    };
-    forLimits({motion.x, shared_x_, motion.solids, shared_solids_}, differ, [&](const Meeting& m, double) {
-      block(m);
-      met = true;
-    });
+    forLimits(
+        {motion.x, shared_x_, motion.solids, shared_solids_},
+        [&](const Meeting& m) { return partlyBlocked(m, shares); },
+        [&](const Meeting& m, double) {
+          block(m);
+          met = true;
+        });
     if (!met)
       return;
   }
+}
+
+/// Whether some movers of a pair go all of the motion, and others go a share of it.
+bool ContactPotential::partlyBlocked(const Meeting& m, const MotionShares& shares)
+{
+  const int movers[3] = {shares.of_point[m.point], m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other],
+                         m.driven ? MotionShares::kPrescribed : shares.of_point[m.point]};
+  bool some = false, all = true;
+  for (const int mover : movers)
+    if (shares.moves(mover))
+    {
+      some = some || shares.isBlocked(mover);
+      all = all && shares.isBlocked(mover);
+    }
+  return some && !all;
 }
 
 /// Sets where points and solids get if each mover goes its share.
 void ContactPotential::setShared(const SurfaceMotion& motion, const MotionShares& shares)
 {
   shared_x_ = motion.x_end;
-  for (Eigen::Index i = 0; i < shared_x_.cols(); ++i)
+  const auto move = [&](int i, int mover) {
+    shared_x_.col(i) = motion.x.col(i) + shares.of(mover) * (motion.x_end.col(i) - motion.x.col(i));
+  };
+  for (int i = 0; i < surface_.points; ++i)
     if (shares.isBlocked(shares.of_point[i]))
-      shared_x_.col(i) = motion.x.col(i) + shares.share * (motion.x_end.col(i) - motion.x.col(i));
+      move(i, shares.of_point[i]);
+  for (const ContactSegment& s : surface_.segments)
+  {
+    if (s.driven & 1)
+      move(s.a, MotionShares::kPrescribed);
+    if (s.driven & 2)
+      move(s.b, MotionShares::kPrescribed);
+  }
   shared_solids_ = motion.solids_end;
   for (std::size_t k = 0; k < shared_solids_.size(); ++k)
     if (shares.isBlocked(shares.of_solid[k]))

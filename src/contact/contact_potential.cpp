@@ -282,11 +282,11 @@ bool ContactPotential::addContact(const Place& place, const PairGap& gap, Contac
   if (place.with_stiffness)
   {
     const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
-    const double own = pair_stiffness * barrier_.stiffness(g) / scale * gap.weight * gap.weight;
-    term.stiffness = own * normals;
+    const double stiffness = pair_stiffness * barrier_.stiffness(g) / scale * gap.weight * gap.weight;
+    term.stiffness = stiffness * normals;
     if (contact.solid < 0)
       term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
-    addMotion(gap, contact, force, own, out);
+    addMotion(gap, contact, force, out);
   }
   out.contacts.push_back(contact);
   out.measures.push_back({energy, gap.gap, g / options_.gap, force * gap.weight, pair_stiffness});
@@ -314,12 +314,10 @@ ContactTerm& ContactPotential::addTerm(const Contact& contact, Batch& out)
 
 /// The place of contact runs along the pieces as they turn: force r^T H^-1 r of the gap, column by column of
 /// H = L D L^T.
-void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, double force, double own, Batch& out)
+void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, double force, Batch& out)
 {
-  constexpr double kNegligible = 1e-3;   // of the pair's own stiffness
   const auto add = [&](const Eigen::Vector4d& along, const Eigen::Vector3d& turning, double d) {
-    const double k = force / d;
-    if (!(d > 0.0) || !(k * (along.squaredNorm() + turning.squaredNorm()) > kNegligible * own))
+    if (!(d > 0.0))
       return;
     ContactRow& row = out.rows.emplace_back();
     copyFour(row.point, contact.point);
@@ -328,7 +326,7 @@ void ContactPotential::addMotion(const PairGap& gap, const Contact& contact, dou
     copyFour(row.across, contact.weight);
     row.normal = gap.normal;
     row.turning = turning;
-    row.stiffness = k;
+    row.stiffness = force / d;
   };
   const PlaceMotion& m = gap.motion;
   if (m.count > 0)

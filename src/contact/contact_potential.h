@@ -109,8 +109,8 @@ public:
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
   /// Finds the same limit for movers that may go different shares of the motion. On entry, shares.blocked marks the
-  /// movers that count as blocked even if they meet nothing. The function also marks the movers that would meet
-  /// something, and sets the share of the motion that blocked movers may go.
+  /// movers that count as blocked even if they meet nothing, and shares.prescribed_moves is set. The function also
+  /// marks the movers that would meet something, and sets the share of the motion that blocked movers may go.
   void limitShares(const SurfaceMotion& motion, MotionShares& shares);
 
   /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
@@ -255,7 +255,7 @@ private:
   void listSegments();
   /// Appends a term of a contact, without its force.
   static ContactTerm& addTerm(const Contact& contact, Batch& out);
-  static void addMotion(const PairGap& gap, const Contact& contact, double force, double own, Batch& out);
+  static void addMotion(const PairGap& gap, const Contact& contact, double force, Batch& out);
   /// Share of the gap at which an object and a solid repel each other.
   double rangeOf(int object, int solid) const
   {
@@ -325,11 +325,12 @@ private:
   {
     return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
   }
-  /// One point of each piece of a pair, or a point of the piece and the number of the solid. They tell which movers may
-  /// meet.
+  /// One point of each piece of a pair, or a point of the piece and the number of the solid; and whether any point of
+  /// them is driven. They tell which movers may meet.
   struct Meeting
   {
-    int point, other, solid = -1;
+    int point, other, solid;
+    bool driven;
   };
   Meeting meetingOf(const GridPairs::Pair& pair) const;
   Meeting meetingOf(const Candidates::OnSolid& on) const;
@@ -342,6 +343,7 @@ private:
   const Candidates& candidatesOf(const SurfaceMotion& motion);
   template <class Wanted, class Take>
   void forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take);
+  static bool partlyBlocked(const Meeting& meeting, const MotionShares& shares);
   void setShared(const SurfaceMotion& motion, const MotionShares& shares);
   double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 

@@ -43,7 +43,9 @@ void Equations::countPoints()
   }
   shares_.of_solid.clear();
   for (const IslandSolid& solid : solids)
-    shares_.of_solid.push_back(solid.body ? solid.body->number : MotionShares::kPrescribed);
+    shares_.of_solid.push_back(solid.body     ? solid.body->number
+                               : moves(solid) ? MotionShares::kPrescribed
+                                              : MotionShares::kFixed);
   const auto count = static_cast<Eigen::Index>(part_of_point_.size());
   for (auto* x : {&points_, &points_base_, &points_end_})
     if (x->cols() != count)
@@ -129,15 +131,13 @@ void Equations::settle()
   }
 }
 
-bool Equations::solidsMove() const
+bool Equations::moves(const IslandSolid& s)
 {
-  const auto moves = [](const std::optional<Twist>& v) {
+  const auto isMotion = [](const std::optional<Twist>& v) {
     return v && (v->linear.squaredNorm() > 0.0 || v->angular.squaredNorm() > 0.0);
   };
-  return std::any_of(solids.begin(), solids.end(), [&](const IslandSolid& s) {
-    return !s.body && (s.start.position != s.target.X_WG.position ||
-                       s.start.orientation.coeffs() != s.target.X_WG.orientation.coeffs() || moves(s.target.velocity));
-  });
+  return !s.body && (s.start.position != s.target.X_WG.position ||
+                     s.start.orientation.coeffs() != s.target.X_WG.orientation.coeffs() || isMotion(s.target.velocity));
 }
 
 /// Puts what is prescribed, in the trial, where it is at the fraction `to`. What driven solids touch moves along with
@@ -223,31 +223,35 @@ void Equations::endStage()
   turns_base_ = turns_begin_ + turns_;
 }
 
-/// Goes from the base towards the trial, as far as nothing touches and no curve is folded. Where nothing moves as
-/// prescribed, the trial that was reached is the start of the solution, and what is not blocked goes all of its way.
-/// Otherwise what is prescribed has to wait there until all else gave way.
+/// Goes from the base towards the trial, as far as nothing touches and no curve is folded. The trial that was reached
+/// is the start of the solution. What is not blocked goes all of its way. If anything is blocked that is prescribed and
+/// moves, all of it has to wait, together with all parts, until what blocks it gave way.
 Approach Equations::approach(double from, double to, double& reached)
 {
   constexpr int kMostRetreats = 20;   // each by half
   const bool held_moves =
       std::any_of(parts_.begin(), parts_.end(), [&](const Part* part) { return part->heldMoves(from, to); });
-  const bool moving = held_moves || (from < to && solidsMove());
+  shares_.prescribed_moves = held_moves || (from < to && solidsMove());
+  // Averages of parts are met wherever the parts are blocked.
+  const bool averages = std::any_of(parts_.begin(), parts_.end(), [](Part* part) { return part->averages(); });
+  const bool together = shares_.prescribed_moves && (from == to || averages);
+  shares_.prescribed_blocked = together;
   for (const Part* part : parts_)
-    shares_.blocked[part->number] = moving || part->joined();
+    shares_.blocked[part->number] = together || part->joined();
   limitShares();
-  double alpha = shares_.share;
-  reached = to;
+  if (shares_.prescribed_blocked)   // Rods keep their shapes beside what holds them.
+    shares_.blockAll();
+  double alpha = shares_.share, held = shares_.of(MotionShares::kPrescribed);
   bool only_folded = false;
-  for (int attempt = 0; attempt < kMostRetreats; ++attempt, alpha *= 0.5)
+  for (int attempt = 0; attempt < kMostRetreats; ++attempt, alpha *= 0.5, held *= 0.5)
   {
+    reached = shares_.prescribed_moves && held < 1.0 ? from + held * (to - from) : to;
     if (alpha < 1.0)
     {
       unsettle();
       for (Part* part : parts_)
         if (attempt > 0 || shares_.isBlocked(part->number))
           part->retreat(attempt == 0 ? alpha : 0.5);
-      if (moving)
-        reached = from + alpha * (to - from);
       place(reached);
       for (Part* part : parts_)
         if (held_moves && from == to)
@@ -257,7 +261,7 @@ Approach Equations::approach(double from, double to, double& reached)
     if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
     {
       accept();
-      return moving && alpha < 1.0 ? Approach::partly : Approach::arrived;
+      return shares_.prescribed_moves && held < 1.0 ? Approach::partly : Approach::arrived;
     }
     only_folded = trial.min_chi <= kFoldedChi && std::isfinite(trial.potential);
   }
@@ -325,6 +329,7 @@ double Equations::stepLimit()
   if (!contact_)
     return alpha;
   moveAlong(alpha);
+  shares_.prescribed_moves = shares_.prescribed_blocked = false;
   for (const Part* part : parts_)
     shares_.blocked[part->number] = part->coupled;
   limitShares();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <memory>
@@ -152,7 +153,8 @@ private:
   void placeSolids(double fraction, std::vector<Pose>& poses) const;
   void gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const;
   void gatherSolids(std::vector<Pose>& poses) const;
-  bool solidsMove() const;
+  static bool moves(const IslandSolid& solid);
+  bool solidsMove() const { return std::any_of(solids.begin(), solids.end(), moves); }
   void take();
   void takeFirst();
   void makeRoom(const ContactTerm& term);

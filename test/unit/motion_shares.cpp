@@ -30,6 +30,23 @@ struct Sticks
     shares.of_point.insert(shares.of_point.end(), 4, mover);
     shares.blocked.push_back(0);
   }
+  /// The first nodes of the last stick are driven.
+  void drive(int nodes)
+  {
+    shares.prescribed_moves = true;
+    for (int k = 0; k < 3; ++k)
+    {
+      ContactSegment& s = surface.segments[surface.segments.size() - 3 + static_cast<std::size_t>(k)];
+      s.driven = static_cast<unsigned char>((k < nodes) + 2 * (k + 1 < nodes));
+    }
+  }
+  bool isDriven(int point) const
+  {
+    for (const ContactSegment& s : surface.segments)
+      if ((s.a == point && (s.driven & 1)) || (s.b == point && (s.driven & 2)))
+        return true;
+    return false;
+  }
   ContactPotential limit()
   {
     ContactOptions options;
@@ -67,31 +84,90 @@ TEST(MotionShares, WhatFollowsABlockedMoverIsBlocked)
     EXPECT_TRUE(sticks.shares.isBlocked(mover)) << mover;
 }
 
-/// In heaps of sticks that fly about, all go their shares without meeting, and the share of the blocked ones is the one
-/// of the whole heap.
+/// What moves as prescribed does not wait for others that block each other.
+TEST(MotionShares, WhatIsPrescribedGoesOnUnlessItIsBlocked)
+{
+  Sticks sticks;
+  sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.add(stick({0.1, -0.1, 0.2}, {0, 1, 0}), {0, 0, 0});
+  sticks.add(stick({0, 0, 5}, {1, 0, 0}), {0, 0, 1});
+  sticks.drive(2);
+  sticks.limit();
+  EXPECT_TRUE(sticks.shares.isBlocked(0));
+  EXPECT_FALSE(sticks.shares.isBlocked(MotionShares::kPrescribed));
+}
+
+/// A driven stick follows another one that is blocked.
+TEST(MotionShares, WhatIsPrescribedWaitsForWhatIsInItsWay)
+{
+  Sticks sticks;
+  sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.add(stick({0.1, -0.1, 0.2}, {0, 1, 0}), {0, 0, 0});
+  sticks.add(stick({0, 0, -0.1}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.drive(4);
+  sticks.limit();
+  EXPECT_TRUE(sticks.shares.isBlocked(MotionShares::kPrescribed));
+}
+
+/// A stick is held at one end, which moves, while the rest of it is blocked. The piece between them turns, so that
+/// another stick comes into its way, be it free or blocked. It would meet neither the moved stick nor the blocked one.
+TEST(MotionShares, APieceBetweenHeldAndFreeNodesIsExamined)
+{
+  Sticks held;
+  held.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0.2, 0});
+  held.drive(1);
+  held.add(stick({0.25, 0.08, -0.1}, {0, 0, 1}), {0, 0, 0});   // blocks the free end
+  for (const bool blocked : {false, true})
+  {
+    Sticks sticks = held;
+    sticks.limit();
+    EXPECT_FALSE(sticks.shares.isBlocked(MotionShares::kPrescribed));
+    sticks = held;
+    if (blocked)
+      sticks.add(stick({0.05, 0.113, -0.1}, {0, 0, 1}), {0, 0.2, 0});
+    else
+      sticks.add(stick({0.05, 0.113, 0.4}, {0, 0, 1}), {0, 0, -0.4});
+    sticks.shares.blocked.back() = blocked;
+    sticks.limit();
+    EXPECT_TRUE(sticks.shares.isBlocked(MotionShares::kPrescribed)) << blocked;
+  }
+}
+
+/// In heaps of sticks that fly about, some of them driven, all go their shares without meeting, and the share of the
+/// blocked ones is the one of the whole heap.
 TEST(MotionShares, NothingMeetsInRandomHeaps)
 {
   Random random(11);
-  int partly = 0;
+  int partly = 0, held = 0;
   for (int trial = 0; trial < 200; ++trial)
   {
     Sticks sticks;
     for (int k = 0; k < 12; ++k)
+    {
       sticks.add(stick({0.12 * (k / 4), 0.12 * (k % 4), 0}, {0, 0, 1}), random.vector(0.05));
+      if (k % 5 == 4)
+        sticks.drive(k == 4 ? 2 : 4);
+    }
     ContactPotential potential = sticks.limit();
     const double whole = potential.stepLimit(sticks.x, sticks.x_end, {}, {});
     ASSERT_EQ(sticks.shares.share, whole) << trial;
     const auto free = std::count(sticks.shares.blocked.begin(), sticks.shares.blocked.end(), 0);
     partly += free > 0 && whole < 1.0;
+    held += sticks.shares.isBlocked(MotionShares::kPrescribed);
     for (int step = 1; step <= 10; ++step)   // places on the way
     {
       Eigen::Matrix3Xd at = sticks.x;
       for (Eigen::Index i = 0; i < at.cols(); ++i)
-        at.col(i) += 0.1 * step * sticks.shares.of(sticks.shares.of_point[i]) * (sticks.x_end.col(i) - at.col(i));
+      {
+        const int mover = sticks.isDriven(static_cast<int>(i)) ? MotionShares::kPrescribed : sticks.shares.of_point[i];
+        at.col(i) += 0.1 * step * sticks.shares.of(mover) * (sticks.x_end.col(i) - at.col(i));
+      }
       ASSERT_GT(potential.clearance(at, {}), 0.0) << trial;
     }
   }
   EXPECT_GT(partly, 50);
+  EXPECT_GT(held, 20);
+  EXPECT_LT(held, 180);
 }
 
 /// Motions that are not finite stop everything.
