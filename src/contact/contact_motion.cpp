@@ -37,7 +37,7 @@ ContactPotential::Meeting ContactPotential::meetingOf(const Candidates::OnSolid&
   return {s.a, -1, on.solid, s.driven != 0};
 }
 
-// Where there are triangles, all that moves as prescribed is blocked anyway.
+// Where there are triangles, everything goes the same share anyway.
 ContactPotential::Meeting ContactPotential::meetingOf(const SheetCandidates::Pair& pair) const
 {
   return pair.edges ? Meeting{sheets_.edges[pair.first].a, sheets_.edges[pair.second].a, -1, false}
@@ -132,73 +132,67 @@ double ContactPotential::stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matri
   return share;
 }
 
-/// Two blocked movers go the same share of the motion, and two free movers go all of it. The limits of the whole motion
-/// therefore hold for both kinds of pairs. A pair of a blocked and a free mover is examined again with the motions that
-/// they then make. If they would meet, both are blocked. All movers are blocked after several rounds, and where there
-/// are triangles, because candidates of triangles hold for one common motion only.
+/// Movers that would meet become a group, which goes the least of their limits. A pair whose movers go the same share
+/// stays apart, because this share is at most the limit of the pair for the whole motion. All other pairs are examined
+/// again with the motions that their movers then make. If they would meet, their groups become one. After several
+/// rounds all movers become one group, and also where there are triangles, because candidates of triangles hold for one
+/// common motion only.
 void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& shares)
 {
   constexpr int kMostRounds = 4;
   check(motion.x, motion.solids);
   check(motion.x_end, motion.solids_end);
-  const bool finite = motion.x.allFinite() && motion.x_end.allFinite();
-  shares.share = finite ? 1.0 : 0.0;
-  const auto block = [&](const Meeting& m) {
-    shares.block(shares.of_point[m.point]);
-    shares.block(m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other]);
-    if (m.driven)
-      shares.block(MotionShares::kPrescribed);
+  if (!motion.x.allFinite() || !motion.x_end.allFinite())
+    return shares.stopAll();
+  const auto unite = [&](const Meeting& m, double limit) {
+    const Movers movers = moversOf(m, shares);
+    for (const int mover : movers)
+    {
+      shares.unite(movers[0], mover);
+      shares.limit(mover, limit);
+    }
   };
-  if (finite)
-    forLimits(
-        motion, [](const Meeting&) { return true; },
-        [&](const Meeting& m, double limit) {
-          shares.share = std::min(shares.share, limit);
-          block(m);
-        });
-  for (int round = 0; shares.share < 1.0 && shares.anyFree(); ++round)
+  forLimits(
+      motion, [](const Meeting&) { return true; }, unite);
+  for (int round = 0; shares.least() < 1.0; ++round)
   {
-    if (round == kMostRounds || !finite || !sheets_.empty())
-      return shares.blockAll();
+    if (round == kMostRounds || !sheets_.empty())
+      return shares.uniteAll();
     setShared(motion, shares);
     bool met = false;
-    forLimits(
-        {motion.x, shared_x_, motion.solids, shared_solids_},
-        [&](const Meeting& m) { return partlyBlocked(m, shares); },
-        [&](const Meeting& m, double) {
-          block(m);
-          met = true;
-        });
+    const auto differ = [&](const Meeting& m) {
+      const Movers movers = moversOf(m, shares);
+      const auto differs = [&](int mover) { return shares.moves(mover) && shares.of(mover) != shares.of(movers[0]); };
+      return std::any_of(movers.begin(), movers.end(), differs);
+    };
+    forLimits({motion.x, shared_x_, motion.solids, shared_solids_}, differ, [&](const Meeting& m, double) {
+      unite(m, 1.0);
+      met = true;
+    });
     if (!met)
       return;
   }
 }
 
-/// Whether some movers of a pair go all of the motion, and others go a share of it.
-bool ContactPotential::partlyBlocked(const Meeting& m, const MotionShares& shares)
+ContactPotential::Movers ContactPotential::moversOf(const Meeting& m, const MotionShares& shares)
 {
-  const int movers[3] = {shares.of_point[m.point], m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other],
-                         m.driven ? MotionShares::kPrescribed : shares.of_point[m.point]};
-  bool some = false, all = true;
-  for (const int mover : movers)
-    if (shares.moves(mover))
-    {
-      some = some || shares.isBlocked(mover);
-      all = all && shares.isBlocked(mover);
-    }
-  return some && !all;
+  const int first = shares.of_point[m.point];
+  return {first, m.solid >= 0 ? shares.of_solid[m.solid] : shares.of_point[m.other],
+          m.driven ? MotionShares::kPrescribed : first};
 }
 
 /// Sets where points and solids get if each mover goes its share.
 void ContactPotential::setShared(const SurfaceMotion& motion, const MotionShares& shares)
 {
-  shared_x_ = motion.x_end;
+  shared_x_.resizeLike(motion.x);
   const auto move = [&](int i, int mover) {
-    shared_x_.col(i) = motion.x.col(i) + shares.of(mover) * (motion.x_end.col(i) - motion.x.col(i));
+    const double share = shares.of(mover);
+    shared_x_.col(i) = motion.x_end.col(i);
+    if (share < 1.0)
+      shared_x_.col(i) = motion.x.col(i) + share * (motion.x_end.col(i) - motion.x.col(i));
   };
   for (int i = 0; i < surface_.points; ++i)
-    if (shares.isBlocked(shares.of_point[i]))
-      move(i, shares.of_point[i]);
+    move(i, shares.of_point[i]);
   for (const ContactSegment& s : surface_.segments)
   {
     if (s.driven & 1)
@@ -208,11 +202,11 @@ void ContactPotential::setShared(const SurfaceMotion& motion, const MotionShares
   }
   shared_solids_ = motion.solids_end;
   for (std::size_t k = 0; k < shared_solids_.size(); ++k)
-    if (shares.isBlocked(shares.of_solid[k]))
+    if (const double share = shares.of(shares.of_solid[k]); share < 1.0)
     {
       const Pose &from = motion.solids[k], &to = motion.solids_end[k];
-      shared_solids_[k].position = from.position + shares.share * (to.position - from.position);
-      shared_solids_[k].orientation = from.orientation.slerp(shares.share, to.orientation);
+      shared_solids_[k].position = from.position + share * (to.position - from.position);
+      shared_solids_[k].orientation = from.orientation.slerp(share, to.orientation);
     }
 }
 

@@ -103,14 +103,13 @@ public:
   void keepSprings(const std::vector<Pose>& solids);
 
   /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance
-  /// between surfaces at least a fifth, or a fifth of the gap. Points go along straight lines; solids' origins too,
-  /// while they turn uniformly by the smaller angle. Conservative [Li et al. 2021, additive CCD]: misses nothing. 0 if
-  /// surfaces meet at x.
+  /// between surfaces at least two fifths, or two fifths of the gap. Points go along straight lines; solids' origins
+  /// too, while they turn uniformly by the smaller angle. Conservative [Li et al. 2021, additive CCD]: misses nothing.
+  /// 0 if surfaces meet at x.
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
-  /// Finds the same limit for movers that may go different shares of the motion. On entry, shares.blocked marks the
-  /// movers that count as blocked even if they meet nothing, and shares.prescribed_moves is set. The function also
-  /// marks the movers that would meet something, and sets the share of the motion that blocked movers may go.
+  /// Finds such limits for movers that may go different shares of the motion. `shares` has been begun, and movers that
+  /// depend on each other have been united. Sets the shares, and unites those that would meet.
   void limitShares(const SurfaceMotion& motion, MotionShares& shares);
 
   /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
@@ -343,7 +342,8 @@ private:
   const Candidates& candidatesOf(const SurfaceMotion& motion);
   template <class Wanted, class Take>
   void forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take);
-  static bool partlyBlocked(const Meeting& meeting, const MotionShares& shares);
+  using Movers = std::array<int, 3>;
+  static Movers moversOf(const Meeting& meeting, const MotionShares& shares);
   void setShared(const SurfaceMotion& motion, const MotionShares& shares);
   double sheetClearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double least);
 

@@ -120,7 +120,7 @@ void Equations::settle()
   const bool may_settle = moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced);
   for (Part* part : parts_)
   {
-    if (may_settle && !part->settled && isAlone(*part) && !shares_.isBlocked(part->number) &&
+    if (may_settle && !part->settled && isAlone(*part) && shares_.of(part->number) == 1.0 &&
         part->increment <= arrived_ && part->evaluation.inertia.positiveDefinite())
     {
       part->settled = true;
@@ -171,7 +171,7 @@ void Equations::beginSubstep(double fraction)
   exact_ = false;
   for (std::size_t k = 0; k < parts_.size(); ++k)   // another island has numbered them differently
     parts_[k]->number = static_cast<int>(k);
-  shares_.blocked.assign(parts_.size(), 1);
+  shares_.begin(static_cast<int>(parts_.size()), false);
   least_share_ = 1.0;
   for (Part* part : parts_)
   {
@@ -224,34 +224,33 @@ void Equations::endStage()
 }
 
 /// Goes from the base towards the trial, as far as nothing touches and no curve is folded. The trial that was reached
-/// is the start of the solution. What is not blocked goes all of its way. If anything is blocked that is prescribed and
-/// moves, all of it has to wait, together with all parts, until what blocks it gave way.
+/// is the start of the solution. What meets nothing goes all of its way. If something is in the way of what is
+/// prescribed, all parts and all that is prescribed go the same share, and wait there until it gave way.
 Approach Equations::approach(double from, double to, double& reached)
 {
   constexpr int kMostRetreats = 20;   // each by half
   const bool held_moves =
       std::any_of(parts_.begin(), parts_.end(), [&](const Part* part) { return part->heldMoves(from, to); });
-  shares_.prescribed_moves = held_moves || (from < to && solidsMove());
-  // Averages of parts are met wherever the parts are blocked.
+  const bool moving = held_moves || (from < to && solidsMove());
+  // Averages of parts are met wherever contact stops the parts.
   const bool averages = std::any_of(parts_.begin(), parts_.end(), [](Part* part) { return part->averages(); });
-  const bool together = shares_.prescribed_moves && (from == to || averages);
-  shares_.prescribed_blocked = together;
-  for (const Part* part : parts_)
-    shares_.blocked[part->number] = together || part->joined();
+  shares_.begin(static_cast<int>(parts_.size()), moving);
+  if (moving && (from == to || averages))
+    shares_.uniteAll();
   limitShares();
-  if (shares_.prescribed_blocked)   // Rods keep their shapes beside what holds them.
-    shares_.blockAll();
-  double alpha = shares_.share, held = shares_.of(MotionShares::kPrescribed);
+  if (shares_.of(MotionShares::kPrescribed) < 1.0)   // Rods keep their shapes beside what holds them.
+    shares_.uniteAll();
+  double alpha = shares_.least(), held = shares_.of(MotionShares::kPrescribed);
   bool only_folded = false;
   for (int attempt = 0; attempt < kMostRetreats; ++attempt, alpha *= 0.5, held *= 0.5)
   {
-    reached = shares_.prescribed_moves && held < 1.0 ? from + held * (to - from) : to;
+    reached = moving && held < 1.0 ? from + held * (to - from) : to;
     if (alpha < 1.0)
     {
       unsettle();
       for (Part* part : parts_)
-        if (attempt > 0 || shares_.isBlocked(part->number))
-          part->retreat(attempt == 0 ? alpha : 0.5);
+        if (const double share = attempt == 0 ? shares_.of(part->number) : 0.5; share < 1.0)
+          part->retreat(share);
       place(reached);
       for (Part* part : parts_)
         if (held_moves && from == to)
@@ -261,7 +260,7 @@ Approach Equations::approach(double from, double to, double& reached)
     if (std::isfinite(trial.energy()) && trial.min_chi > kFoldedChi)
     {
       accept();
-      return shares_.prescribed_moves && held < 1.0 ? Approach::partly : Approach::arrived;
+      return moving && held < 1.0 ? Approach::partly : Approach::arrived;
     }
     only_folded = trial.min_chi <= kFoldedChi && std::isfinite(trial.potential);
   }
@@ -269,9 +268,30 @@ Approach Equations::approach(double from, double to, double& reached)
   return only_folded ? Approach::arrived : Approach::squeezed;
 }
 
+/// Parts that touch, or that joints connect, go the same share, because the direction of each was computed together
+/// with those of the others.
+void Equations::uniteCoupled()
+{
+  const Part* joined = nullptr;
+  for (const Part* part : parts_)
+    if (part->joined())
+    {
+      shares_.unite(part->number, (joined ? joined : part)->number);
+      joined = part;
+    }
+  forTerms([&](const ContactTerm& term) {
+    for (int p = 1; p < 4; ++p)
+      if (term.point[p] >= 0)
+        shares_.unite(partOf(term.point[0]).number, partOf(term.point[p]).number);
+    if (const RigidPart* body = bodyOf(term.solid))
+      shares_.unite(partOf(term.point[0]).number, body->number);
+  });
+}
+
 /// Sets how far parts may go from the base to the trial.
 void Equations::limitShares()
 {
+  uniteCoupled();
   gather(points_end_, poses_end_);
   contact_->limitShares({points_base_, points_end_, poses_base_, poses_end_}, shares_);
 }
@@ -282,14 +302,14 @@ double Equations::roomToTrial()
   return contact_->stepLimit(points_base_, points_end_, poses_base_, poses_end_);
 }
 
-/// If stepLimit() has found blocked parts, `alpha` is how far these go, and the others go farther in proportion.
+/// `alpha` is how far those parts go of which stepLimit() found the least share. All others go farther in proportion.
 void Equations::moveAlong(double alpha)
 {
-  const double others = alpha > 0.0 && least_share_ < 1.0 ? std::min(1.0, alpha / least_share_) : alpha;
-  moved_fully_ = others == 1.0;
+  const double most = alpha > 0.0 && least_share_ < 1.0 ? std::min(1.0, alpha / least_share_) : alpha;
+  moved_fully_ = most == 1.0;
   forParts([&](Part& part) {
     if (part.has_direction)
-      part.moveAlong(shares_.isBlocked(part.number) ? alpha : others);
+      part.moveAlong(least_share_ < 1.0 ? most * shares_.of(part.number) : most);
   });
   follow();
 }
@@ -318,8 +338,6 @@ void Equations::restoreBase()
 
 // ---- measures
 
-/// Coupled parts go the same share of the direction, because the direction of each was computed together with those of
-/// the others.
 double Equations::stepLimit()
 {
   double alpha = 1.0;
@@ -329,11 +347,9 @@ double Equations::stepLimit()
   if (!contact_)
     return alpha;
   moveAlong(alpha);
-  shares_.prescribed_moves = shares_.prescribed_blocked = false;
-  for (const Part* part : parts_)
-    shares_.blocked[part->number] = part->coupled;
+  shares_.begin(static_cast<int>(parts_.size()), false);
   limitShares();
-  least_share_ = shares_.share;
+  least_share_ = shares_.least();
   return alpha * least_share_;
 }
 

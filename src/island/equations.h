@@ -148,6 +148,7 @@ private:
   static bool isAlone(const Part& part) { return !part.coupled && part.own_terms.empty(); }
   void unsettle();
   void settle();
+  void uniteCoupled();
   void limitShares();
   void countPoints();
   void placeSolids(double fraction, std::vector<Pose>& poses) const;
@@ -207,9 +208,9 @@ private:
   /// since the stage began [rad].
   Eigen::VectorXd turns_begin_, turns_base_, turns_;
   MotionShares shares_;
-  double least_share_ = 1.0;   ///< share of the direction that blocked parts go; set by stepLimit()
+  double least_share_ = 1.0;   ///< least share of the direction that a part goes; set by stepLimit()
   double arrived_ = 0.0;       ///< largest increment of a part that may settle [-]
-  /// The last direction was computed without a shift, and parts that are not blocked went all of it.
+  /// The last direction was computed without a shift, and parts that met nothing went all of it.
   bool by_newton_ = false, moved_fully_ = false;
   bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap

@@ -140,7 +140,7 @@ TEST(ContactSheetMotion, NoPairIsMissedNearAWay)
   EXPECT_GT(touching, 20);
 }
 
-/// Whatever the motion: up to the limit a fifth of the distance that there was remains, by the independent check.
+/// Whatever the motion: up to the limit two fifths of the distance that there was remain, by the independent check.
 TEST(ContactSheetMotion, NothingPassesUpToTheLimit)
 {
   Random random(1);
@@ -159,11 +159,11 @@ TEST(ContactSheetMotion, NothingPassesUpToTheLimit)
       const double t = share * i / 50;
       least = std::min(least, p.clearance(moves.points(s, t), moves.poses(s, t)));
     }
-    EXPECT_GE(least, 0.2 * start * (1 - 1e-6)) << "case " << k;
+    EXPECT_GE(least, 0.4 * start * (1 - 1e-6)) << "case " << k;
     if (share < 1.0)
     {
       ++stopped;
-      EXPECT_LT(p.clearance(moves.points(s, share), moves.poses(s, share)), 0.3 * kMotionGap) << "case " << k;
+      EXPECT_LT(p.clearance(moves.points(s, share), moves.poses(s, share)), 0.5 * kMotionGap) << "case " << k;
       // and there the barrier acts
       EXPECT_GT(p.evaluate(moves.points(s, share), moves.poses(s, share), false), 0.0) << "case " << k;
     }
@@ -321,7 +321,7 @@ TEST(ContactSheetMotion, FallsOntoATable)
   const Eigen::Matrix3Xd there = s.x + share * (end - s.x);
   EXPECT_GT(p.evaluate(there, s.solids, true), 0.0);
   EXPECT_EQ(p.terms().size(), 121u);   // each vertex once
-  EXPECT_NEAR(there.row(2).minCoeff(), 0.5 * kMotionThickness + 0.21 * kMotionGap, 0.03 * kMotionGap);
+  EXPECT_NEAR(there.row(2).minCoeff(), 0.5 * kMotionThickness + 0.41 * kMotionGap, 0.03 * kMotionGap);
 }
 
 /// What something else than motion brought too near is thinned, and can begin a step.

@@ -1,6 +1,8 @@
 // How far parts of a surface may go that move independently of each other (ContactPotential::limitShares).
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "test/support/contact.h"
 
 namespace slender::test {
@@ -20,6 +22,8 @@ struct Sticks
   ContactSurface surface;
   Eigen::Matrix3Xd x, x_end;
   MotionShares shares;
+  std::vector<std::array<int, 2>> united;
+  bool prescribed_moves = false;
 
   void add(const Eigen::Matrix3Xd& nodes, const Eigen::Vector3d& way)
   {
@@ -28,12 +32,11 @@ struct Sticks
     x_end.conservativeResize(3, x.cols());
     x_end.rightCols(4) = nodes.colwise() + way;
     shares.of_point.insert(shares.of_point.end(), 4, mover);
-    shares.blocked.push_back(0);
   }
   /// The first nodes of the last stick are driven.
   void drive(int nodes)
   {
-    shares.prescribed_moves = true;
+    prescribed_moves = true;
     for (int k = 0; k < 3; ++k)
     {
       ContactSegment& s = surface.segments[surface.segments.size() - 3 + static_cast<std::size_t>(k)];
@@ -52,9 +55,13 @@ struct Sticks
     ContactOptions options;
     options.gap = kContactGap;
     ContactPotential potential(surface, options);
+    shares.begin(static_cast<int>(surface.objects.size()), prescribed_moves);
+    for (const auto& [a, b] : united)
+      shares.unite(a, b);
     potential.limitShares({x, x_end, {}, {}}, shares);
     return potential;
   }
+  bool isStopped(int mover) const { return shares.of(mover) < 1.0; }
 };
 
 TEST(MotionShares, WhatIsBlockedDoesNotStopWhatIsFree)
@@ -64,11 +71,11 @@ TEST(MotionShares, WhatIsBlockedDoesNotStopWhatIsFree)
   sticks.add(stick({0.1, -0.1, 0.2}, {0, 1, 0}), {0, 0, 0});
   sticks.add(stick({0, 0, 5}, {1, 0, 0}), {0, 0, 1});
   sticks.limit();
-  EXPECT_TRUE(sticks.shares.isBlocked(0));
-  EXPECT_TRUE(sticks.shares.isBlocked(1));
-  EXPECT_FALSE(sticks.shares.isBlocked(2));
-  EXPECT_GT(sticks.shares.share, 0.5);   // four fifths of 0.15 m
-  EXPECT_LT(sticks.shares.share, 0.8);
+  EXPECT_TRUE(sticks.isStopped(0));
+  EXPECT_TRUE(sticks.isStopped(1));
+  EXPECT_FALSE(sticks.isStopped(2));
+  EXPECT_EQ(sticks.shares.of(0), sticks.shares.of(1));
+  EXPECT_NEAR(sticks.shares.least(), (0.15 - 0.4 * kContactGap) / 0.2, 0.01);   // nearly all of 0.15 m
 }
 
 /// A stick follows another one at its distance. If the first one is blocked, the second one must wait, too.
@@ -81,7 +88,7 @@ TEST(MotionShares, WhatFollowsABlockedMoverIsBlocked)
   sticks.add(stick({0, 0, -0.2}, {1, 0, 0}), {0, 0, 0.2});
   sticks.limit();
   for (int mover = 0; mover < 4; ++mover)
-    EXPECT_TRUE(sticks.shares.isBlocked(mover)) << mover;
+    EXPECT_TRUE(sticks.isStopped(mover)) << mover;
 }
 
 /// What moves as prescribed does not wait for others that block each other.
@@ -93,8 +100,8 @@ TEST(MotionShares, WhatIsPrescribedGoesOnUnlessItIsBlocked)
   sticks.add(stick({0, 0, 5}, {1, 0, 0}), {0, 0, 1});
   sticks.drive(2);
   sticks.limit();
-  EXPECT_TRUE(sticks.shares.isBlocked(0));
-  EXPECT_FALSE(sticks.shares.isBlocked(MotionShares::kPrescribed));
+  EXPECT_TRUE(sticks.isStopped(0));
+  EXPECT_FALSE(sticks.isStopped(MotionShares::kPrescribed));
 }
 
 /// A driven stick follows another one that is blocked.
@@ -106,7 +113,7 @@ TEST(MotionShares, WhatIsPrescribedWaitsForWhatIsInItsWay)
   sticks.add(stick({0, 0, -0.1}, {1, 0, 0}), {0, 0, 0.2});
   sticks.drive(4);
   sticks.limit();
-  EXPECT_TRUE(sticks.shares.isBlocked(MotionShares::kPrescribed));
+  EXPECT_TRUE(sticks.isStopped(MotionShares::kPrescribed));
 }
 
 /// A stick is held at one end, which moves, while the rest of it is blocked. The piece between them turns, so that
@@ -121,24 +128,56 @@ TEST(MotionShares, APieceBetweenHeldAndFreeNodesIsExamined)
   {
     Sticks sticks = held;
     sticks.limit();
-    EXPECT_FALSE(sticks.shares.isBlocked(MotionShares::kPrescribed));
+    EXPECT_FALSE(sticks.isStopped(MotionShares::kPrescribed));
     sticks = held;
     if (blocked)
       sticks.add(stick({0.05, 0.113, -0.1}, {0, 0, 1}), {0, 0.2, 0});
     else
       sticks.add(stick({0.05, 0.113, 0.4}, {0, 0, 1}), {0, 0, -0.4});
-    sticks.shares.blocked.back() = blocked;
+    if (blocked)
+      sticks.united.push_back({0, 2});
     sticks.limit();
-    EXPECT_TRUE(sticks.shares.isBlocked(MotionShares::kPrescribed)) << blocked;
+    EXPECT_TRUE(sticks.isStopped(MotionShares::kPrescribed)) << blocked;
   }
 }
 
-/// In heaps of sticks that fly about, some of them driven, all go their shares without meeting, and the share of the
-/// blocked ones is the one of the whole heap.
+/// Two pairs of sticks have shares of their own, unless something depends on both.
+TEST(MotionShares, GroupsHaveTheirOwnShares)
+{
+  Sticks sticks;
+  for (const double z : {0.0, 5.0})
+  {
+    sticks.add(stick({0, 0, z}, {1, 0, 0}), {0, 0, z == 0.0 ? 0.2 : 0.4});
+    sticks.add(stick({0.1, -0.1, z + 0.2}, {0, 1, 0}), {0, 0, 0});
+  }
+  sticks.limit();
+  EXPECT_GT(sticks.shares.of(0), 1.9 * sticks.shares.of(2));
+  EXPECT_LT(sticks.shares.of(2), 1.0);
+  sticks.united.push_back({1, 3});
+  sticks.limit();
+  EXPECT_EQ(sticks.shares.of(0), sticks.shares.of(2));
+}
+
+/// One stick follows another one at its distance. Both are stopped by others, the follower later, so that it would run
+/// into the first one.
+TEST(MotionShares, GroupsThatWouldMeetBecomeOne)
+{
+  Sticks sticks;
+  sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.add(stick({0.25, -0.1, 0.12}, {0, 1, 0}), {0, 0, 0});
+  sticks.add(stick({-0.2, 0, -0.1}, {1, 0, 0}), {0, 0, 0.2});
+  sticks.add(stick({-0.15, -0.1, 0.12}, {0, 1, 0}), {0, 0, 0});
+  sticks.limit();
+  EXPECT_NEAR(sticks.shares.of(0), (0.07 - 0.4 * kContactGap) / 0.2, 0.01);
+  EXPECT_EQ(sticks.shares.of(2), sticks.shares.of(0));
+}
+
+/// In heaps of sticks that fly about, some of them driven, all go their shares without meeting, and the least share is
+/// the limit of the whole heap.
 TEST(MotionShares, NothingMeetsInRandomHeaps)
 {
   Random random(11);
-  int partly = 0, held = 0;
+  int partly = 0, several = 0, held = 0;
   for (int trial = 0; trial < 200; ++trial)
   {
     Sticks sticks;
@@ -150,10 +189,13 @@ TEST(MotionShares, NothingMeetsInRandomHeaps)
     }
     ContactPotential potential = sticks.limit();
     const double whole = potential.stepLimit(sticks.x, sticks.x_end, {}, {});
-    ASSERT_EQ(sticks.shares.share, whole) << trial;
-    const auto free = std::count(sticks.shares.blocked.begin(), sticks.shares.blocked.end(), 0);
-    partly += free > 0 && whole < 1.0;
-    held += sticks.shares.isBlocked(MotionShares::kPrescribed);
+    ASSERT_EQ(sticks.shares.least(), whole) << trial;
+    std::set<double> different;
+    for (int mover = 0; mover < 12; ++mover)
+      different.insert(sticks.shares.of(mover));
+    partly += different.count(1.0) > 0 && different.size() > 1;
+    several += different.size() > 2;
+    held += sticks.isStopped(MotionShares::kPrescribed);
     for (int step = 1; step <= 10; ++step)   // places on the way
     {
       Eigen::Matrix3Xd at = sticks.x;
@@ -166,6 +208,7 @@ TEST(MotionShares, NothingMeetsInRandomHeaps)
     }
   }
   EXPECT_GT(partly, 50);
+  EXPECT_GT(several, 10);
   EXPECT_GT(held, 20);
   EXPECT_LT(held, 180);
 }
@@ -177,8 +220,8 @@ TEST(MotionShares, StopAtWhatIsNotFinite)
   sticks.add(stick({0, 0, 0}, {1, 0, 0}), {0, 0, std::nan("")});
   sticks.add(stick({0, 0, 5}, {1, 0, 0}), {0, 0, 0});
   sticks.limit();
-  EXPECT_EQ(sticks.shares.share, 0.0);
-  EXPECT_TRUE(sticks.shares.isBlocked(1));
+  EXPECT_EQ(sticks.shares.least(), 0.0);
+  EXPECT_TRUE(sticks.isStopped(1));
 }
 
 /// Energies, terms and limits of a large heap have the same bits on one thread and on several.

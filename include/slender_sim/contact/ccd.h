@@ -15,7 +15,7 @@ struct ApproachLimit
 {
   double thickness = 0.0;   ///< [m] sum of the radii
   double reach = 0.0;       ///< [m] > 0: farther away, pieces may come as near as kept * reach at once
-  double kept = 0.2;        ///< [-]
+  double kept = 0.4;        ///< [-]
 };
 
 struct MovingPoint
