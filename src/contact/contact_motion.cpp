@@ -37,7 +37,7 @@ ContactPotential::Meeting ContactPotential::meetingOf(const Candidates::OnSolid&
   return {s.a, -1, on.solid, s.driven != 0};
 }
 
-// Where there are triangles, everything goes the same share anyway.
+// Where there are triangles, all movers go the same share, so that it does not matter what is driven.
 ContactPotential::Meeting ContactPotential::meetingOf(const SheetCandidates::Pair& pair) const
 {
   return pair.edges ? Meeting{sheets_.edges[pair.first].a, sheets_.edges[pair.second].a, -1, false}
@@ -154,7 +154,7 @@ void ContactPotential::limitShares(const SurfaceMotion& motion, MotionShares& sh
   };
   forLimits(
       motion, [](const Meeting&) { return true; }, unite);
-  for (int round = 0; shares.least() < 1.0; ++round)
+  for (int round = 0; shares.differ(); ++round)
   {
     if (round == kMostRounds || !sheets_.empty())
       return shares.uniteAll();

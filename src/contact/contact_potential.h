@@ -102,10 +102,10 @@ public:
   /// those from which the next one begins.
   void keepSprings(const std::vector<Pose>& solids);
 
-  /// The largest share alpha <= 1 of the motion from (x, solids) to (x_end, solids_end) that leaves of each distance
-  /// between surfaces at least two fifths, or two fifths of the gap. Points go along straight lines; solids' origins
-  /// too, while they turn uniformly by the smaller angle. Conservative [Li et al. 2021, additive CCD]: misses nothing.
-  /// 0 if surfaces meet at x.
+  /// Returns the share <= 1 of the motion from (x, solids) to (x_end, solids_end) up to which each distance between
+  /// surfaces keeps two fifths of what it was, or of the gap if it was more than the gap. Points and the origins of
+  /// solids go along straight lines, and solids turn uniformly by the smaller angle. The share is never too large
+  /// [Li et al. 2021, additive CCD]. It is 0 if surfaces meet at x.
   double stepLimit(const Eigen::Matrix3Xd& x, const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids,
                    const std::vector<Pose>& solids_end);
   /// Finds such limits for movers that may go different shares of the motion. `shares` has been begun, and movers that
@@ -225,8 +225,8 @@ private:
   template <class F>
   static void visit(const Candidates& candidates, int number, F&& f);
   static int count(const Candidates& candidates);
-  /// Calls f(first, last, batch) for consecutive ranges of 0 ... count-1, and appends what they add to found_, in this
-  /// order.
+  /// Calls f(first, last, batch) for consecutive ranges of 0 ... count-1. Appends the batches to found_ in the order of
+  /// the ranges.
   template <class F>
   void inBatches(int count, F&& f);
   /// A configuration that is evaluated.
@@ -324,12 +324,12 @@ private:
   {
     return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
   }
-  /// One point of each piece of a pair, or a point of the piece and the number of the solid; and whether any point of
-  /// them is driven. They tell which movers may meet.
+  /// Tells which movers may meet in a pair of pieces, or of a piece and a solid.
   struct Meeting
   {
-    int point, other, solid;
-    bool driven;
+    int point, other;   ///< a point of each piece; `other` is -1 if the second one is a solid
+    int solid;          ///< number of the solid; -1: none
+    bool driven;        ///< A point of the pieces is driven.
   };
   Meeting meetingOf(const GridPairs::Pair& pair) const;
   Meeting meetingOf(const Candidates::OnSolid& on) const;

@@ -26,12 +26,13 @@ public:
   }
   /// What does not move is never united with others or limited.
   bool moves(int mover) const { return mover == kPrescribed ? prescribed_moves_ : mover != kFixed; }
+  /// The groups of two movers become one, which goes the smaller one of their shares.
   void unite(int a, int b)
   {
     if (!moves(a) || !moves(b))
       return;
     const int one = shorten(a), other = shorten(b), from = std::max(one, other), to = std::min(one, other);
-    parent_[from] = to;   // keeps the ways short where movers come in the order of a chain
+    parent_[from] = to;   // The ways to groups stay short if movers come in the order of a chain.
     share_[to] = std::min(share_[to], share_[from]);
   }
   void uniteAll()
@@ -39,6 +40,7 @@ public:
     for (std::size_t k = 0; k + 1 < parent_.size(); ++k)
       unite(static_cast<int>(k), k == 0 ? kPrescribed : 0);
   }
+  /// The group of the mover goes no more than this share.
   void limit(int mover, double share)
   {
     if (moves(mover))
@@ -49,7 +51,17 @@ public:
     uniteAll();
     share_.assign(share_.size(), 0.0);
   }
+  /// Returns the share of a mover; 1 for what does not move.
   double of(int mover) const { return moves(mover) ? share_[groupOf(mover)] : 1.0; }
+  /// Returns whether two movers go different shares.
+  bool differ() const
+  {
+    const double first = of(0);
+    for (std::size_t k = 1; k + 1 < parent_.size(); ++k)
+      if (of(static_cast<int>(k)) != first)
+        return true;
+    return prescribed_moves_ && of(kPrescribed) != first;
+  }
   double least() const { return *std::min_element(share_.begin(), share_.end()); }
 
 private:

@@ -225,7 +225,8 @@ void Equations::endStage()
 
 /// Goes from the base towards the trial, as far as nothing touches and no curve is folded. The trial that was reached
 /// is the start of the solution. What meets nothing goes all of its way. If something is in the way of what is
-/// prescribed, all parts and all that is prescribed go the same share, and wait there until it gave way.
+/// prescribed, everything goes the same share of its way. Then `reached` is less than `to`, and a solution has to let
+/// the obstacle give way before the next call.
 Approach Equations::approach(double from, double to, double& reached)
 {
   constexpr int kMostRetreats = 20;   // each by half

@@ -6,8 +6,8 @@
 
 namespace slender {
 
-/// Calls f(k) for 0 <= k < count, in any order, on this many threads; 0: as OpenMP says. A thread takes `chunk` numbers
-/// at a time. f must not throw.
+/// Calls f(k) for 0 <= k < count, in any order, on this many threads. If `threads` is 0, OpenMP chooses their number.
+/// A thread takes `chunk` numbers at a time. f must not throw.
 template <class F>
 void parallelFor(int threads, int count, [[maybe_unused]] int chunk, F&& f)
 {

@@ -91,7 +91,7 @@ TEST(MotionShares, WhatFollowsABlockedMoverIsBlocked)
     EXPECT_TRUE(sticks.isStopped(mover)) << mover;
 }
 
-/// What moves as prescribed does not wait for others that block each other.
+/// Two sticks block each other. A driven stick, which is far from both, goes all of its way.
 TEST(MotionShares, WhatIsPrescribedGoesOnUnlessItIsBlocked)
 {
   Sticks sticks;
@@ -172,8 +172,8 @@ TEST(MotionShares, GroupsThatWouldMeetBecomeOne)
   EXPECT_EQ(sticks.shares.of(2), sticks.shares.of(0));
 }
 
-/// In heaps of sticks that fly about, some of them driven, all go their shares without meeting, and the least share is
-/// the limit of the whole heap.
+/// Heaps of sticks fly about, and some of the sticks are driven. No sticks meet if each goes its share. The least share
+/// is the limit of the whole heap.
 TEST(MotionShares, NothingMeetsInRandomHeaps)
 {
   Random random(11);
