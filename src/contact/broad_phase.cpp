@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "linalg/parallel_for.h"
 
 namespace slender {
 
@@ -44,21 +47,17 @@ double GridPairs::cellSize(const std::vector<BoundingBox>& boxes) const
   }
 }
 
-const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBox>& boxes)
+/// Sorts the boxes by the buckets of the cells that they overlap.
+void GridPairs::fillBuckets(const std::vector<BoundingBox>& boxes, double inverse_size)
 {
-  pairs_.clear();
-  found_.clear();
   entries_.clear();
-  if (boxes.size() < 2)
-    return pairs_;
-  const double inverse = 1.0 / cellSize(boxes);
   for (std::size_t i = 0; i < boxes.size(); ++i)
   {
     std::int32_t low[3], high[3];
     for (int k = 0; k < 3; ++k)
     {
-      low[k] = cellOf(boxes[i].low[k], inverse);
-      high[k] = cellOf(boxes[i].high[k], inverse);
+      low[k] = cellOf(boxes[i].low[k], inverse_size);
+      high[k] = cellOf(boxes[i].high[k], inverse_size);
     }
     for (std::int32_t x = low[0]; x <= high[0]; ++x)
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
@@ -70,33 +69,53 @@ const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBo
     buckets *= 2;
   bucket_start_.assign(buckets + 1, 0);
   for (const Entry& e : entries_)
-    ++bucket_start_[bucketOf(e.cell, buckets - 1) + 1];
-  for (unsigned k = 0; k < buckets; ++k)
-    bucket_start_[k + 1] += bucket_start_[k];
+    ++bucket_start_[bucketOf(e.cell, buckets - 1)];
+  std::partial_sum(bucket_start_.begin(), bucket_start_.end(), bucket_start_.begin());
   sorted_.resize(entries_.size());
-  for (auto e = entries_.rbegin(); e != entries_.rend(); ++e)   // ends at the buckets' starts shifted by one
-    sorted_[--bucket_start_[bucketOf(e->cell, buckets - 1) + 1]] = *e;
-  for (unsigned k = 0; k < buckets; ++k)
-  {
-    const int from = bucket_start_[k + 1],
-              to = k + 2 <= buckets ? bucket_start_[k + 2] : static_cast<int>(sorted_.size());
-    for (int p = from; p < to; ++p)
-      for (int q = p + 1; q < to; ++q)
-      {
-        const Entry &a = sorted_[p], &b = sorted_[q];
-        if (a.cell[0] != b.cell[0] || a.cell[1] != b.cell[1] || a.cell[2] != b.cell[2])
-          continue;
-        const BoundingBox &u = boxes[a.box], &v = boxes[b.box];
-        if (!u.overlaps(v))
-          continue;
-        // of the cells that both fill, the one with the lowest corner of what they share reports the pair
-        bool reports = true;
-        for (int c = 0; c < 3; ++c)
-          reports = reports && a.cell[c] == cellOf(std::max(u.low[c], v.low[c]), inverse);
-        if (reports)
-          found_.push_back({std::min(a.box, b.box), std::max(a.box, b.box)});
-      }
-  }
+  for (auto e = entries_.rbegin(); e != entries_.rend(); ++e)   // from the end of each bucket to its start
+    sorted_[--bucket_start_[bucketOf(e->cell, buckets - 1)]] = *e;
+}
+
+void GridPairs::search(const std::vector<BoundingBox>& boxes, double inverse_size, unsigned bucket,
+                       std::vector<Pair>& found) const
+{
+  const int from = bucket_start_[bucket], to = bucket_start_[bucket + 1];
+  for (int p = from; p < to; ++p)
+    for (int q = p + 1; q < to; ++q)
+    {
+      const Entry &a = sorted_[p], &b = sorted_[q];
+      if (a.cell[0] != b.cell[0] || a.cell[1] != b.cell[1] || a.cell[2] != b.cell[2])
+        continue;
+      const BoundingBox &u = boxes[a.box], &v = boxes[b.box];
+      if (!u.overlaps(v))
+        continue;
+      // of the cells that both fill, the one with the lowest corner of what they share reports the pair
+      bool reports = true;
+      for (int c = 0; c < 3; ++c)
+        reports = reports && a.cell[c] == cellOf(std::max(u.low[c], v.low[c]), inverse_size);
+      if (reports)
+        found.push_back({std::min(a.box, b.box), std::max(a.box, b.box)});
+    }
+}
+
+const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBox>& boxes, int threads)
+{
+  constexpr unsigned kShare = 1 << 13;   // buckets that a thread searches at a time
+  pairs_.clear();
+  if (boxes.size() < 2)
+    return pairs_;
+  const double inverse_size = 1.0 / cellSize(boxes);
+  fillBuckets(boxes, inverse_size);
+  const auto buckets = static_cast<unsigned>(bucket_start_.size()) - 1;
+  const unsigned shares = (buckets + kShare - 1) / kShare;
+  if (found_.size() < shares)
+    found_.resize(shares);
+  for (auto& found : found_)
+    found.clear();
+  parallelFor(threads, static_cast<int>(shares), 1, [&](int k) {
+    for (unsigned bucket = k * kShare; bucket < std::min(buckets, (k + 1) * kShare); ++bucket)
+      search(boxes, inverse_size, bucket, found_[k]);
+  });
   sortPairs(static_cast<int>(boxes.size()));
   return pairs_;
 }
@@ -104,13 +123,14 @@ const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBo
 void GridPairs::sortPairs(int boxes)
 {
   first_start_.assign(boxes + 1, 0);
-  for (const Pair& p : found_)
-    ++first_start_[p.first + 1];
-  for (int i = 0; i < boxes; ++i)
-    first_start_[i + 1] += first_start_[i];
-  pairs_.resize(found_.size());
-  for (const Pair& p : found_)
-    pairs_[first_start_[p.first]++] = p;
+  for (const auto& found : found_)
+    for (const Pair& p : found)
+      ++first_start_[p.first + 1];
+  std::partial_sum(first_start_.begin(), first_start_.end(), first_start_.begin());
+  pairs_.resize(first_start_.back());
+  for (const auto& found : found_)
+    for (const Pair& p : found)
+      pairs_[first_start_[p.first]++] = p;
   int from = 0;
   for (int i = 0; i < boxes; ++i)
   {

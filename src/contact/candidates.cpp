@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linalg/parallel_for.h"
 #include "slender_sim/geometry/rotation.h"
 
 namespace slender {
@@ -33,25 +34,25 @@ double contactShare(const ContactSegment& a, const ContactSegment& b, const Cont
 }
 
 void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
-                       const Motion& motion, double gap, double margin, double turn)
+                       const Motion& motion, const Range& range)
 {
+  const double gap = range.gap, margin = range.margin;
   margin_ = margin;
   start_ = motion.x;
   way_ = motion.x_end - motion.x;
   low_ = motion.x.cwiseMin(motion.x_end).array() - margin;
   high_ = motion.x.cwiseMax(motion.x_end).array() + margin;
   boxes_.resize(surface.segments.size());
-  for (std::size_t i = 0; i < boxes_.size(); ++i)
-  {
+  parallelFor(range.threads, static_cast<int>(boxes_.size()), 1024, [&](int i) {
     const ContactSegment& s = surface.segments[i];
     const double around = s.radius + 0.5 * gap;
     boxes_[i].low = low_.col(s.a).cwiseMin(low_.col(s.b)).array() - around;
     boxes_[i].high = high_.col(s.a).cwiseMax(high_.col(s.b)).array() + around;
-  }
+  });
   pairs_.clear();
   if (std::any_of(surface.objects.begin(), surface.objects.end(),
                   [](const ContactObject& o) { return o.self || o.others; }))
-    for (const GridPairs::Pair& p : grid_.find(boxes_))
+    for (const GridPairs::Pair& p : grid_.find(boxes_, range.threads))
       if (mayMeet(surface, surface.segments[p.first], surface.segments[p.second], gap))
         pairs_.push_back(p);
   on_solids_.clear();
@@ -61,7 +62,7 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   for (std::size_t k = 0; k < solids_.size(); ++k)
   {
     shift_[k] = (motion.solids_end[k].position - solids_[k].position).norm() + margin;
-    turn_[k] = angleBetween(motion.solids_end[k], solids_[k]) + turn;
+    turn_[k] = angleBetween(motion.solids_end[k], solids_[k]) + range.turn;
     findOnSolid(surface, static_cast<int>(k), solids[k], motion, gap, margin);
   }
   if (!sheets.empty())

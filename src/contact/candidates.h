@@ -19,12 +19,18 @@ public:
     int solid, segment, piece;
   };
   using Motion = SurfaceMotion;
+  struct Range
+  {
+    double gap, margin;   ///< [m]
+    double turn;          ///< [rad]
+    int threads;          ///< see parallelFor()
+  };
 
-  /// Finds all pairs that may come within `gap` of each other while all points are at one instant of the motion, but
-  /// for at most `margin` [m] in each coordinate, and solids leave the motion by at most `margin` and `turn` [rad].
+  /// Finds all pairs that may come within the gap of each other while all points are at one instant of the motion, but
+  /// for at most the margin in each coordinate, and solids leave the motion by at most the margin and the turn.
   /// Without triangles each point may be anywhere in the box of its own motion, enlarged by the margin.
   void build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
-             const Motion& motion, double gap, double margin, double turn);
+             const Motion& motion, const Range& range);
   /// Forgets everything: the surface has other pieces from now on.
   void clear()
   {

@@ -21,7 +21,8 @@ const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
   margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
   Candidates& found = moved <= kLongest * options_.gap ? near_ : swept_;
   const bool near = &found == &near_;
-  found.build(surface_, sheets_, solids_, motion, options_.gap, near ? margin_ : 0.0, near ? kTurnMargin : 0.0);
+  found.build(surface_, sheets_, solids_, motion,
+              {options_.gap, near ? margin_ : 0.0, near ? kTurnMargin : 0.0, threads_});
   return found;
 }
 
@@ -231,7 +232,7 @@ bool ContactPotential::fit(std::vector<Thinned>& list, const std::array<int, 3>&
 bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   letPass(x, poses, x, poses);   // what presses on held points passes, also when the pieces are new
-  near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, options_.gap, margin_, 0.0);
+  near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, {options_.gap, margin_, 0.0, threads_});
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
   for (const GridPairs::Pair& pair : near_.pairs())

@@ -177,7 +177,7 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
     return kInfinity;
   x_now_ = x;
   if (!near_.holdsFor(x, poses))
-    near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, options_.gap, margin_, kTurnMargin);
+    near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, {options_.gap, margin_, kTurnMargin, threads_});
   const Place place{x, poses, with_stiffness};
   inBatches(count(near_), [&](int first, int last, Batch& out) {
     for (int k = first; k < last && !out.meet; ++k)

@@ -27,6 +27,7 @@ void Equations::setContact(ContactSurface surface, const ContactOptions& options
 void Equations::setThreads(int threads)
 {
   threads_ = threads;
+  matrix_.setThreads(threads);
   if (contact_)
     contact_->setThreads(threads);
 }
@@ -118,17 +119,16 @@ void Equations::unsettle()
 void Equations::settle()
 {
   const bool may_settle = moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced);
-  for (Part* part : parts_)
-  {
-    if (may_settle && !part->settled && isAlone(*part) && shares_.of(part->number) == 1.0 &&
-        part->increment <= arrived_ && part->evaluation.inertia.positiveDefinite())
+  forAllParts([&](Part& part) {
+    if (may_settle && !part.settled && isAlone(part) && shares_.of(part.number) == 1.0 && part.increment <= arrived_ &&
+        part.evaluation.inertia.positiveDefinite())
     {
-      part->settled = true;
-      part->moveAlong(0.0);   // makes the trial complete, which remains the one that others see
-      part->evaluate(false, {});
+      part.settled = true;
+      part.moveAlong(0.0);   // makes the trial complete, which remains the one that others see
+      part.evaluate(false, {});
     }
-    part->increment = kInfinity;
-  }
+    part.increment = kInfinity;
+  });
 }
 
 bool Equations::moves(const IslandSolid& s)

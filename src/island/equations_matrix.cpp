@@ -213,9 +213,10 @@ void Equations::buildPattern()
   const std::vector<int> blocks = numberBlocks();
   matrix_.finish(chooseSolver(), blocks, turns_of_triples_);
   keys_valid_ = true;
-  for (Part* part : parts_)
-    if (part->coupled)
-      part->findEntries(matrix_);
+  forAllParts([&](Part& part) {
+    if (part.coupled)
+      part.findEntries(matrix_);
+  });
 }
 
 /// Numbers the blocks of the matrix: parts that joints connect are one block, any other part is one. Returns the block
@@ -283,8 +284,12 @@ bool Equations::sweepsPay()
 void Equations::assemble(const HessianShift& shift, bool whole)
 {
   matrix_.clear();
-  for (Part* part : parts_)
-    if (part->coupled)
+  forAllParts([&](Part& part) {
+    if (part.coupled && !part.joined())
+      part.addHessian(matrix_, shift);
+  });
+  for (Part* part : parts_)   // Joints add to entries of both parts.
+    if (part->coupled && part->joined())
       part->addHessian(matrix_, shift);
   if (!contact_)
     return;

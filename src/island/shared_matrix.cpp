@@ -159,11 +159,9 @@ void SharedMatrix::takeBlocks(const std::vector<int>& blocks)
   }
   if (starts != block_starts_ || rows != block_rows_)
   {
-    block_starts_ = starts;
-    block_rows_ = rows;
-    if (!block_cholesky_)
-      block_cholesky_.emplace(simplicial_);
-    block_cholesky_->setPattern(unknowns_, std::move(starts), std::move(rows));
+    block_starts_ = std::move(starts);
+    block_rows_ = std::move(rows);
+    block_cholesky_.setPattern(block_starts_, block_rows_);
   }
   gradients_.resize(static_cast<std::size_t>(unknowns_));
   x_.resize(static_cast<std::size_t>(unknowns_));
@@ -205,13 +203,10 @@ bool SharedMatrix::factorDirectly()
   direct_ = true;
   if (unknowns_ == 0)
     return true;
-  if (!cholesky_)
-    cholesky_.emplace(simplicial_);
   if (!cholesky_known_)
-    cholesky_->setPattern(unknowns_, starts_, rows_);
+    cholesky_.setPattern(starts_, rows_);
   cholesky_known_ = true;
-  std::copy(values_.begin(), values_.end(), cholesky_->values());
-  return cholesky_->factor();
+  return cholesky_.factor(values_, threads_);
 }
 
 bool SharedMatrix::factorBlocks()
@@ -219,10 +214,10 @@ bool SharedMatrix::factorBlocks()
   direct_ = false;
   if (unknowns_ == 0)
     return true;
-  double* values = block_cholesky_->values();
+  block_values_.resize(block_entries_.size());
   for (std::size_t k = 0; k < block_entries_.size(); ++k)
-    values[k] = values_[block_entries_[k]];
-  return block_cholesky_->factor();
+    block_values_[k] = values_[block_entries_[k]];
+  return block_cholesky_.factor(block_values_, threads_);
 }
 
 bool SharedMatrix::solve()
@@ -232,7 +227,7 @@ bool SharedMatrix::solve()
   if (direct_)
   {
     iterations_ = 0;
-    cholesky_->solve(solution_.data());
+    cholesky_.solve(solution_.data(), threads_);
     return true;
   }
   if (solver_ == Solver::sweeps)
@@ -247,7 +242,7 @@ bool SharedMatrix::solve()
       [this](const std::vector<double>& p, std::vector<double>& ap) { multiply(p, ap); },
       [this](const std::vector<double>& r, std::vector<double>& z) {
         z = r;
-        block_cholesky_->solve(z.data());
+        block_cholesky_.solve(z.data(), threads_);
       });
   iterations_ = result.iterations;
   if (!result.definite || result.residual > kTolerance)

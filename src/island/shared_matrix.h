@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "island/point_sweeps.h"
+#include "linalg/component_cholesky.h"
 #include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
-#include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
 
@@ -66,7 +65,8 @@ public:
   using Bases = std::array<int, 4>;
 
   /// `simplicial`: see SparseCholesky.
-  explicit SharedMatrix(bool simplicial) : simplicial_(simplicial) {}
+  explicit SharedMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
+  void setThreads(int threads) { threads_ = threads; }   ///< of factorisations; see parallelFor()
 
   // ---- pattern
   void begin(int unknowns);
@@ -191,15 +191,16 @@ private:
   std::vector<double> solution_;
   Solver solver_ = Solver::cholesky;
 
-  const bool simplicial_;
-  std::optional<SparseCholesky> cholesky_;   ///< once it is needed, like that of the blocks
-  bool cholesky_known_ = false;              ///< has the present pattern
-  bool direct_ = true;                       ///< the last factorisation is that of the whole matrix
+  int threads_ = 1;
+  ComponentCholesky cholesky_;
+  bool cholesky_known_ = false;   ///< has the present pattern
+  bool direct_ = true;            ///< the last factorisation is that of the whole matrix
 
   std::unique_ptr<PointSweeps> sweeps_;   ///< once they are needed
-  std::optional<SparseCholesky> block_cholesky_;
+  ComponentCholesky block_cholesky_;
   std::vector<int> block_entries_;               ///< places in values_ of the entries of blocks
   std::vector<int> block_starts_, block_rows_;   ///< pattern of the blocks
+  std::vector<double> block_values_;
   ConjugateGradientsIn<Space> gradients_;
   std::vector<double> x_;
   int iterations_ = 0;

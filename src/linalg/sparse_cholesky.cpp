@@ -91,7 +91,8 @@ struct SparseCholesky::Impl
     int at, column_length;   ///< of its first column, and of that column
     bool transposed, diagonal;
   };
-  void takeSupernodes();
+  void takeOrder();
+  cholmod_sparse permutedView();
 
   std::vector<int> place;   ///< of each point (or, without points, unknown) in the order of elimination
   std::vector<Target> targets;
@@ -99,9 +100,9 @@ struct SparseCholesky::Impl
   cholmod_dense* right = nullptr;   ///< work space of solvePoints: for blocks
   PointVector permuted;             ///< for numbers
   SupernodalNumeric numeric;
-  /// Without points: where each entry goes in the order of elimination, and the values in that order.
-  std::vector<int> permuted_at;
-  std::vector<double> permuted_values;
+  /// Without points: the matrix in the order of elimination, where each entry goes there, and work space of solve().
+  std::vector<int> permuted_starts, permuted_rows, permuted_at;
+  std::vector<double> permuted_values, permuted_right;
 
   cholmod_common common;
   cholmod_factor* factor = nullptr;
@@ -113,6 +114,7 @@ struct SparseCholesky::Impl
 SparseCholesky::SparseCholesky(bool simplicial) : impl_(std::make_unique<Impl>(simplicial)) {}
 SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
+SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
 void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<int> rows)
 {
@@ -126,36 +128,55 @@ void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<i
   m.factor = cholmod_analyze(&a, &m.common);
   if (!m.factor)
     throw std::bad_alloc();
-  if (m.factor->is_super)
-    m.takeSupernodes();
+  m.takeOrder();
 }
 
-/// CHOLMOD's own factorisation by supernodes takes memory and starts a team of threads in each call, which takes most
-/// of the time of matrices of a few thousand unknowns.
-void SparseCholesky::Impl::takeSupernodes()
+/// Keeps the matrix in the order of elimination: its lower triangle for supernodes, else its upper one. From these the
+/// factor follows without copies. CHOLMOD would make two of them in each factorisation.
+void SparseCholesky::Impl::takeOrder()
 {
   const int n = static_cast<int>(starts.size()) - 1;
+  const bool lower = factor->is_super;
   place.resize(n);
   for (int k = 0; k < n; ++k)
     place[static_cast<int*>(factor->Perm)[k]] = k;
-  std::vector<int> permuted_starts(n + 1, 0), permuted_rows(rows.size());
+  const auto columnOf = [&](int i, int j) { return (place[i] < place[j]) == lower ? place[i] : place[j]; };
+  permuted_starts.assign(n + 1, 0);
+  permuted_rows.resize(rows.size());
   for (int j = 0; j < n; ++j)
     for (int k = starts[j]; k < starts[j + 1]; ++k)
-      ++permuted_starts[std::min(place[j], place[rows[k]]) + 1];
+      ++permuted_starts[columnOf(j, rows[k]) + 1];
   std::partial_sum(permuted_starts.begin(), permuted_starts.end(), permuted_starts.begin());
   std::vector<int> next(permuted_starts.begin(), permuted_starts.end() - 1);
   permuted_at.resize(rows.size());
   for (int j = 0; j < n; ++j)
     for (int k = starts[j]; k < starts[j + 1]; ++k)
     {
-      const int at = next[std::min(place[j], place[rows[k]])]++;
+      const int column = columnOf(j, rows[k]), at = next[column]++;
       permuted_at[k] = at;
-      permuted_rows[at] = std::max(place[j], place[rows[k]]);
+      permuted_rows[at] = place[j] + place[rows[k]] - column;
     }
   permuted_values.resize(rows.size());
+  permuted_right.resize(n);
+  factor->ordering = CHOLMOD_NATURAL;   // of the permuted matrix
+  std::iota(static_cast<int*>(factor->Perm), static_cast<int*>(factor->Perm) + n, 0);
+  if (!lower)
+    return;
   if (!cholmod_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, factor, &common))
     throw std::bad_alloc();
   numeric.setPattern(supernodes(), permuted_starts, permuted_rows);
+}
+
+/// The upper triangle in the order of elimination.
+cholmod_sparse SparseCholesky::Impl::permutedView()
+{
+  cholmod_sparse a = patternView(permuted_starts, permuted_rows);
+  a.stype = 1;
+  a.sorted = 0;
+  a.x = permuted_values.data();
+  a.xtype = CHOLMOD_REAL;
+  a.dtype = CHOLMOD_DOUBLE;
+  return a;
 }
 
 void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3); }
@@ -342,13 +363,11 @@ double* SparseCholesky::values() { return impl_->values.data(); }
 bool SparseCholesky::factor()
 {
   Impl& m = *impl_;
+  for (std::size_t k = 0; k < m.values.size(); ++k)
+    m.permuted_values[m.permuted_at[k]] = m.values[k];
   if (m.factor->is_super)
-  {
-    for (std::size_t k = 0; k < m.values.size(); ++k)
-      m.permuted_values[m.permuted_at[k]] = m.values[k];
     return m.numeric.factor(m.permuted_values.data(), static_cast<double*>(m.factor->x));
-  }
-  cholmod_sparse a = m.view();
+  cholmod_sparse a = m.permutedView();
   m.common.status = CHOLMOD_OK;
   cholmod_factorize(&a, m.factor, &m.common);
   return m.common.status == CHOLMOD_OK && m.factor->minor == m.factor->n;
@@ -357,14 +376,17 @@ bool SparseCholesky::factor()
 void SparseCholesky::solve(double* x) const
 {
   Impl& m = *impl_;
+  for (int i = 0; i < size(); ++i)
+    m.permuted_right[m.place[i]] = x[i];
   cholmod_dense b{};
   b.nrow = b.d = b.nzmax = size();
   b.ncol = 1;
-  b.x = x;
+  b.x = m.permuted_right.data();
   b.xtype = CHOLMOD_REAL;
   b.dtype = CHOLMOD_DOUBLE;
   cholmod_solve2(CHOLMOD_A, m.factor, &b, nullptr, &m.solution, nullptr, &m.work_y, &m.work_e, &m.common);
-  std::copy_n(static_cast<const double*>(m.solution->x), b.nrow, x);
+  for (int i = 0; i < size(); ++i)
+    x[i] = static_cast<const double*>(m.solution->x)[m.place[i]];
 }
 
 }   // namespace slender

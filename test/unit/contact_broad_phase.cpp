@@ -23,7 +23,7 @@ TEST(BroadPhase, FindsThePairsOfBruteForceInOrder)
   GridPairs grid;
   for (int k = 0; k < 60; ++k)
   {
-    const int n = k < 3 ? k : 20 + 10 * k;
+    const int n = k < 3 ? k : k == 59 ? 6000 : 20 + 10 * k;   // the last fills several shares of buckets
     const double spread = k % 3 == 0 ? 1e3 : 1.0;   // also far from the origin, and with a few huge or flat boxes
     std::vector<BoundingBox> boxes;
     for (int i = 0; i < n; ++i)
@@ -39,10 +39,13 @@ TEST(BroadPhase, FindsThePairsOfBruteForceInOrder)
     if (k == 40)
       std::fill(boxes.begin(), boxes.end(), boxes[0]);
     const auto expected = allPairs(boxes);
-    const auto& found = grid.find(boxes);
-    ASSERT_EQ(found.size(), expected.size()) << k;
-    for (std::size_t i = 0; i < found.size(); ++i)
-      ASSERT_TRUE(found[i].first == expected[i].first && found[i].second == expected[i].second) << k;
+    for (const int threads : {1, 2})
+    {
+      const auto& found = grid.find(boxes, threads);
+      ASSERT_EQ(found.size(), expected.size()) << k;
+      for (std::size_t i = 0; i < found.size(); ++i)
+        ASSERT_TRUE(found[i].first == expected[i].first && found[i].second == expected[i].second) << k;
+    }
   }
 }
 

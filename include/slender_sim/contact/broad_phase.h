@@ -38,8 +38,8 @@ public:
   {
     int first, second;   ///< first < second
   };
-  /// All overlapping pairs, sorted. Boxes must be finite.
-  const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes);
+  /// All overlapping pairs, sorted. Boxes must be finite. `threads`: see parallelFor().
+  const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes, int threads = 1);
 
 private:
   struct Entry
@@ -48,11 +48,15 @@ private:
     int box;
   };
   double cellSize(const std::vector<BoundingBox>& boxes) const;
+  void fillBuckets(const std::vector<BoundingBox>& boxes, double inverse_size);
+  void search(const std::vector<BoundingBox>& boxes, double inverse_size, unsigned bucket,
+              std::vector<Pair>& found) const;
   void sortPairs(int boxes);
 
   std::vector<Entry> entries_, sorted_;
-  std::vector<int> bucket_start_;
-  std::vector<Pair> found_, pairs_;
+  std::vector<int> bucket_start_;          ///< one per bucket, then the number of entries
+  std::vector<std::vector<Pair>> found_;   ///< one list for each share of the buckets
+  std::vector<Pair> pairs_;
   std::vector<int> first_start_;
 };
 

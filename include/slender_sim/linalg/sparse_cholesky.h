@@ -16,6 +16,7 @@ public:
   explicit SparseCholesky(bool simplicial = false);
   ~SparseCholesky();
   SparseCholesky(SparseCholesky&&) noexcept;
+  SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   /// Lower triangle by columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending, the
   /// diagonal among them. Analyses the pattern (fill-reducing order); values() are zero afterwards.

@@ -1,0 +1,114 @@
+#include "component_cholesky.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "parallel_for.h"
+
+namespace slender {
+
+bool ComponentCholesky::haveSamePattern(const Component& a, const Component& b)
+{
+  return a.hash == b.hash && a.starts == b.starts && a.rows == b.rows;
+}
+
+/// Numbers the components in the order of their first unknowns.
+void ComponentCholesky::findComponents(const std::vector<int>& starts, const std::vector<int>& rows)
+{
+  const int n = static_cast<int>(starts.size()) - 1;
+  std::vector<int> before(n);   // a forest: each unknown names an earlier one of its component, the first one itself
+  std::iota(before.begin(), before.end(), 0);
+  const auto first = [&](int u) {
+    while (before[u] != u)
+      u = before[u] = before[before[u]];
+    return u;
+  };
+  for (int j = 0; j < n; ++j)
+    for (int k = starts[j]; k < starts[j + 1]; ++k)
+    {
+      const int a = first(j), b = first(rows[k]);
+      before[std::max(a, b)] = std::min(a, b);
+    }
+  components_.clear();
+  component_of_.resize(n);
+  number_.resize(n);
+  for (int u = 0; u < n; ++u)
+  {
+    if (before[u] == u)
+    {
+      component_of_[u] = static_cast<int>(components_.size());
+      components_.emplace_back().starts.push_back(0);
+    }
+    else
+      component_of_[u] = component_of_[before[u]];
+    std::vector<int>& unknowns = components_[component_of_[u]].unknowns;
+    number_[u] = static_cast<int>(unknowns.size());
+    unknowns.push_back(u);
+  }
+}
+
+void ComponentCholesky::analyse(Component& component, std::vector<Component>& known) const
+{
+  const auto same = std::find_if(known.begin(), known.end(),
+                                 [&](const Component& other) { return haveSamePattern(component, other); });
+  if (same == known.end())
+  {
+    component.cholesky.emplace(simplicial_);
+    component.cholesky->setPattern(static_cast<int>(component.unknowns.size()), component.starts, component.rows);
+    return;
+  }
+  component.cholesky = std::move(same->cholesky);
+  known.erase(same);
+}
+
+void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::vector<int>& rows)
+{
+  constexpr std::uint64_t kPrime = 0x100000001b3;   // of FNV-1a
+  std::vector<Component> known;
+  known.swap(components_);
+  findComponents(starts, rows);
+  const auto mix = [](Component& component, int number) { component.hash = (component.hash ^ number) * kPrime; };
+  for (std::size_t u = 0; u < component_of_.size(); ++u)
+  {
+    Component& component = components_[component_of_[u]];
+    for (int k = starts[u]; k < starts[u + 1]; ++k)
+    {
+      component.entries.push_back(k);
+      component.rows.push_back(number_[rows[k]]);
+      mix(component, component.rows.back());
+    }
+    component.starts.push_back(static_cast<int>(component.rows.size()));
+    mix(component, component.starts.back());
+  }
+  for (Component& component : components_)
+  {
+    component.x.resize(component.unknowns.size());
+    analyse(component, known);
+  }
+}
+
+bool ComponentCholesky::factor(const std::vector<double>& values, int threads)
+{
+  parallelFor(threads, static_cast<int>(components_.size()), 1, [&](int n) {
+    Component& component = components_[n];
+    double* own = component.cholesky->values();
+    for (std::size_t k = 0; k < component.entries.size(); ++k)
+      own[k] = values[component.entries[k]];
+    component.definite = component.cholesky->factor();
+  });
+  return std::all_of(components_.begin(), components_.end(), [](const Component& c) { return c.definite; });
+}
+
+void ComponentCholesky::solve(double* x, int threads)
+{
+  parallelFor(threads, static_cast<int>(components_.size()), 1, [&](int n) {
+    Component& component = components_[n];
+    for (std::size_t k = 0; k < component.unknowns.size(); ++k)
+      component.x[k] = x[component.unknowns[k]];
+    component.cholesky->solve(component.x.data());
+    for (std::size_t k = 0; k < component.unknowns.size(); ++k)
+      x[component.unknowns[k]] = component.x[k];
+  });
+}
+
+}   // namespace slender
