@@ -1,6 +1,5 @@
 #include "slender_sim/node/bag_reader.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>

@@ -1,9 +1,7 @@
 #include "slender_sim/node/guide_inputs.h"
 
 #include <algorithm>
-#include <set>
 
-#include "slender_sim/node/converters.h"
 #include "subscribe.h"
 
 namespace slender {

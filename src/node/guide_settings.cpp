@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include "scene/reader/yaml_number.h"
-
 namespace slender {
 namespace {
 

@@ -1,6 +1,5 @@
 #include "slender_sim/node/point_guide_buffer.h"
 
-#include <algorithm>
 #include <stdexcept>
 
 namespace slender {

@@ -21,7 +21,6 @@
 #include "slender_sim/node/scene_markers.h"
 #include "slender_sim/node/scene_option.h"
 #include "slender_sim/scene/reader.h"
-#include "slender_sim/scene/residual_text.h"
 #include "slender_sim/scene/state_bytes.h"
 
 namespace slender {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "scene/reader/yaml_number.h"
+#include "slender_sim/dynamics/failure_place.h"
 
 namespace slender {
 namespace {

@@ -5,7 +5,6 @@
 #include <ros/console.h>
 
 #include "scene/reader/yaml_cursor.h"
-#include "scene/reader/yaml_number.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/message_intake.h"
 

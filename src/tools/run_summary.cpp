@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "moduli.h"
-#include "slender_sim/scene/residual_text.h"
 
 namespace slender {
 

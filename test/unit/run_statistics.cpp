@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/scene/reader.h"
-#include "slender_sim/scene/residual_text.h"
 
 namespace slender {
 namespace {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,7 +21,6 @@
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/scene/limits_config.h"
-#include "slender_sim/scene/record_fields.h"
 #include "slender_sim/scene/statics_config.h"
 #include "slender_sim/scene/tracking_config.h"
 
@@ -31,62 +31,18 @@ constexpr double kMaxCoordinate = 1e6;   ///< [m] of what a scene or a message p
 constexpr double kMaxBeltSpeed = 1e3;    ///< [m/s] of each component
 constexpr double kMaxWindSpeed = 1e3;    ///< [m/s] of each component
 
-/// A curve as the scene file states it. Exactly one alternative.
-/// last edge length over the first
-struct StraightCurve
+/// A curve of the scene: a formula, or the points of a polyline.
+struct Curve
 {
-  Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0};
-  int edges = 50;
-  double grading = 1;
-};
-/// from the scene or from a CSV file; resampled when edges is given
-struct PolylineCurve
-{
-  std::vector<Eigen::Vector3d> points;
+  /// of a formula: how many it makes; of a polyline: those into which it is divided, nothing: the points are its nodes
   std::optional<int> edges;
+  /// Nodes [m] of the curve with so many edges. A catenary hangs along gravity. Null: `points` are the curve.
+  std::function<Eigen::Matrix3Xd(int edges, const Eigen::Vector3d& gravity)> formula{};
+  std::vector<Eigen::Vector3d> points{};   ///< from the scene or from a CSV file
 };
-struct ArcCurve
-{
-  Eigen::Vector3d center{0, 0, 0}, start{1, 0, 0}, axis{0, 0, 1};
-  double angle = 1.0;
-  int edges = 50;
-};
-struct HelixCurve
-{
-  Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1};
-  double radius = 0.1, pitch = 0.05, turns = 3;
-  int edges = 150;
-};
-/// hangs along gravity (or -z)
-struct CatenaryCurve
-{
-  Eigen::Vector3d from{0, 0, 0}, to{1, 0, 0};
-  double length = 1.2;
-  int edges = 50;
-};
-/// See geometry/curves.h for the next three.
-struct TrefoilCurve
-{
-  Eigen::Vector3d center{0, 0, 0}, axis{1, 0, 0}, up{0, 0, 1};
-  double radius = 0.1, length = 1.5;
-  double separation = 0.0;   ///< 0: an eighth of the radius
-  bool left_handed = false;
-  int edges = 150;
-};
-struct TorusKnotCurve
-{
-  Eigen::Vector3d center{0, 0, 0}, axis{0, 0, 1};
-  double radius = 0.1, tube_radius = 0.04;
-  int around = 2, through = 3, edges = 120;
-};
-struct VeeCurve
-{
-  Eigen::Vector3d tip{0, 0, 0}, direction{1, 0, 0}, normal{0, 0, 1};
-  double arm = 0.5, angle = M_PI / 2;
-  int edges = 50;
-};
-using Curve = std::variant<StraightCurve, PolylineCurve, ArcCurve, HelixCurve, CatenaryCurve, TrefoilCurve,
-                           TorusKnotCurve, VeeCurve>;
+
+/// `grading`: length of the last edge over that of the first.
+Curve straightLine(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges, double grading = 1.0);
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
 struct CrossSection
@@ -223,12 +179,13 @@ struct SectionFrame
 struct RodConfig
 {
   std::string name;
-  std::string place;                    ///< "FILE:LINE: PATH" for messages; empty when not read from a file
-  Curve centerline = StraightCurve{};   ///< rest (natural) shape, also the initial one unless `initial` is given
-  std::optional<Curve> initial;         ///< initial shape; its edges are resampled to those of the centerline
-  bool closed = false;                  ///< loop: the last node is joined to the first by one more edge
-  bool naturally_straight = false;      ///< rest curvature zero whatever the centerline's shape
-  JointOptions joints;                  ///< `curvature`, `matched_to_arcs`
+  std::string place;   ///< "FILE:LINE: PATH" for messages; empty when not read from a file
+  /// rest (natural) shape, also the initial one unless `initial` is given
+  Curve centerline = straightLine({0, 0, 0}, {1, 0, 0}, 50);
+  std::optional<Curve> initial;      ///< initial shape; its edges are resampled to those of the centerline
+  bool closed = false;               ///< loop: the last node is joined to the first by one more edge
+  bool naturally_straight = false;   ///< rest curvature zero whatever the centerline's shape
+  JointOptions joints;               ///< `curvature`, `matched_to_arcs`
   /// joints.curvature is chosen when the rod is built: see `curvature` in docs/rods.md
   bool automatic_curvature = true;
   std::vector<double> rest_twist;   ///< natural twist [rad]: of the whole rod, or of each joint; empty: none
@@ -247,6 +204,9 @@ struct RodConfig
   /// what it follows (`track`), with one set of test functions; null: nothing
   std::shared_ptr<const TrackingConfig> tracking;
   std::vector<SectionFrame> broadcast_tf;   ///< sections whose frames nodes publish on tf
+  int edges = 0;                            ///< of the rest shape, as the reader has found them; 0: not known
+
+  int nodes() const { return edges + (edges > 0 && !closed ? 1 : 0); }
 };
 
 struct ContactConfig
@@ -399,6 +359,18 @@ struct StartConfig
 /// Names of rods and cloths with the nodes or vertices of theirs that tables hold, ascending. Of an object that is not
 /// named, tables hold all.
 using NodeChoice = std::map<std::string, std::vector<int>>;
+
+/// Quantities that `record: {fields: [...]}` adds to what is recorded. Nothing is computed of those that are not named.
+enum class RecordField
+{
+  curvature,       ///< of rods, per node
+  twist,           ///< of rods, per node
+  strain,          ///< of rods, per edge
+  force,           ///< internal force of rods, per edge
+  moment,          ///< internal moment of rods, per node
+  energy,          ///< per rod, cloth and simulated body
+  contact_force,   ///< of rods and cloths, per node or vertex; the sum on an obstacle or a body
+};
 
 struct RecordConfig
 {

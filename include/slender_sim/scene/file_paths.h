@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <stdexcept>
 #include <string>
 
@@ -23,5 +24,11 @@ void makeFolder(const std::string& folder);
 /// Throws std::runtime_error when something is at `path` that is neither a regular file nor a link to one: reading a
 /// FIFO would wait for ever, and a device might have no end.
 void requireRegularFile(const std::string& path);
+
+/// Removes files of an earlier run from a folder, so that two runs are never mixed: regular files whose names `ours`
+/// accepts and that begin with `beginning`. Other files stay. Throws std::runtime_error when such a name belongs to a
+/// file that begins otherwise: this program did not write it.
+void clearEarlierRun(const std::string& folder, const std::function<bool(const std::string& name)>& ours,
+                     const std::string& beginning);
 
 }   // namespace slender

@@ -41,4 +41,8 @@ struct RunStatistics
 /// first; one more line sums up the others. `names` are the names of all grasps of the scene.
 std::vector<std::string> graspLines(const RunStatistics& statistics, const std::vector<std::string>& names);
 
+/// Returns a text about the largest unbalanced force of a run, for summaries: "3e-09 of the largest force". With
+/// `one_newton_step` the text adds that forces are not balanced by design, because a value near one is then no failure.
+std::string residualText(const SceneConfig& scene, double residual);
+
 }   // namespace slender

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 
 #include "slender_sim/geometry/curves.h"
 
@@ -13,14 +12,6 @@ namespace {
 
 constexpr double coincident = 1e-7;   // of the curve's length: nodes closer than this are one
 
-Eigen::Matrix3Xd toMatrix(const std::vector<Eigen::Vector3d>& points)
-{
-  Eigen::Matrix3Xd matrix(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t k = 0; k < points.size(); ++k)
-    matrix.col(static_cast<Eigen::Index>(k)) = points[k];
-  return matrix;
-}
-
 bool endsMeet(const Eigen::Matrix3Xd& nodes)
 {
   const double length = edgeLengths(nodes, false).sum();
@@ -29,73 +20,34 @@ bool endsMeet(const Eigen::Matrix3Xd& nodes)
 
 Eigen::Matrix3Xd dropLast(const Eigen::Matrix3Xd& nodes) { return nodes.leftCols(nodes.cols() - 1); }
 
-/// Points of the curve. With `edges` the formulas use that number instead of their own (polylines keep their
-/// points).
-Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity, std::optional<int> edges)
+/// Points of the curve: a formula makes so many edges, and a polyline keeps its points.
+Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity, int edges)
 {
-  return std::visit(
-      [&](const auto& c) -> Eigen::Matrix3Xd {
-        using T = std::decay_t<decltype(c)>;
-        if constexpr (std::is_same_v<T, StraightCurve>)
-        {
-          return straightCurve(c.from, c.to, edges.value_or(c.edges), c.grading);
-        }
-        else if constexpr (std::is_same_v<T, ArcCurve>)
-        {
-          return arcCurve(c.center, c.start, c.axis, c.angle, edges.value_or(c.edges));
-        }
-        else if constexpr (std::is_same_v<T, HelixCurve>)
-        {
-          return helixCurve(c.center, c.axis, c.radius, c.pitch, c.turns, edges.value_or(c.edges));
-        }
-        else if constexpr (std::is_same_v<T, CatenaryCurve>)
-        {
-          const Eigen::Vector3d down = gravity.norm() > 0 ? gravity : Eigen::Vector3d(0, 0, -1);
-          return catenaryCurve(c.from, c.to, c.length, down, edges.value_or(c.edges));
-        }
-        else if constexpr (std::is_same_v<T, TrefoilCurve>)
-        {
-          const double separation = c.separation > 0 ? c.separation : c.radius / 8;
-          return trefoilCurve(c.center, c.axis, c.up, c.radius, separation, c.length, c.left_handed,
-                              edges.value_or(c.edges));
-        }
-        else if constexpr (std::is_same_v<T, TorusKnotCurve>)
-        {
-          return torusKnotCurve(c.center, c.axis, c.radius, c.tube_radius, c.around, c.through,
-                                edges.value_or(c.edges));
-        }
-        else if constexpr (std::is_same_v<T, VeeCurve>)
-        {
-          return veeCurve(c.tip, c.direction, c.normal, c.arm, c.angle, edges.value_or(c.edges));
-        }
-        else
-        {
-          return toMatrix(c.points);
-        }
-      },
-      curve);
-}
-
-std::optional<int> sampledEdges(const Curve& curve)
-{
-  const auto* polyline = std::get_if<PolylineCurve>(&curve);
-  return polyline ? polyline->edges : std::nullopt;
+  if (curve.formula)
+    return curve.formula(edges, gravity);
+  return Eigen::Map<const Eigen::Matrix3Xd>(curve.points.at(0).data(), 3,
+                                            static_cast<Eigen::Index>(curve.points.size()));
 }
 
 }   // namespace
 
+Curve straightLine(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges, double grading)
+{
+  return {edges, [=](int n, const Eigen::Vector3d&) { return straightCurve(from, to, n, grading); }};
+}
+
 Eigen::Matrix3Xd curveNodes(const Curve& curve, const Eigen::Vector3d& gravity)
 {
-  return curvePoints(curve, gravity, std::nullopt);
+  return curvePoints(curve, gravity, curve.edges.value_or(0));
 }
 
 Eigen::Matrix3Xd restNodes(const RodConfig& rod, const Eigen::Vector3d& gravity)
 {
-  Eigen::Matrix3Xd nodes = curvePoints(rod.centerline, gravity, std::nullopt);
+  Eigen::Matrix3Xd nodes = curveNodes(rod.centerline, gravity);
   if (rod.closed && endsMeet(nodes))
     nodes = dropLast(nodes);
-  const auto edges = sampledEdges(rod.centerline);
-  return edges ? resampleCurve(nodes, rod.closed, *edges) : nodes;
+  const bool resampled = !rod.centerline.formula && rod.centerline.edges;
+  return resampled ? resampleCurve(nodes, rod.closed, *rod.centerline.edges) : nodes;
 }
 
 Eigen::Matrix3Xd initialNodes(const RodConfig& rod, const Eigen::Matrix3Xd& rest, const Eigen::Vector3d& gravity)
@@ -111,8 +63,7 @@ Eigen::Matrix3Xd initialNodes(const RodConfig& rod, const Eigen::Matrix3Xd& rest
   Eigen::Matrix3Xd points = curvePoints(*rod.initial, gravity, asked);
   if (rod.closed)
     points = endsMeet(points) ? dropLast(points) : curvePoints(*rod.initial, gravity, asked - 1);
-  const bool as_given = points.cols() == rest.cols() &&
-                        (std::holds_alternative<PolylineCurve>(*rod.initial) ? !sampledEdges(*rod.initial) : uniform);
+  const bool as_given = points.cols() == rest.cols() && (rod.initial->formula ? uniform : !rod.initial->edges);
   return as_given ? points : resampleCurve(points, rod.closed, lengthFractions(lengths));
 }
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "scene_tree.h"
+#include "scene_text.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/scene_edit.h"
 #include "yaml_cursor.h"
@@ -305,7 +305,7 @@ private:
 
   void checkPath(const std::string& assignment) const
   {
-    const std::vector<std::string> parts = splitPath(assignment.substr(0, assignment.find('=')));
+    const std::vector<std::string> parts = split(assignment.substr(0, assignment.find('=')), '.');
     for (const auto& [section, keys] : changeable)
     {
       if (section != parts[0])

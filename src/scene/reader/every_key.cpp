@@ -1,4 +1,4 @@
-#include "every_key.h"
+#include "scene_text.h"
 
 namespace slender {
 

@@ -30,21 +30,18 @@ void makeLinks(const Chain& chain, const Motion (&motions)[2], RodConfig rod, co
     const Eigen::Vector3d center = from + k * spacing * along;
     // An opening is at the side, where it does not let the neighbours go as long as the link keeps its shape.
     const Eigen::Vector3d across = k % 2 == 0 ? side : along.cross(side), axis = along.cross(across);
-    ArcCurve arc;
-    arc.center = center;
-    arc.axis = axis;
-    arc.start = center + Eigen::AngleAxisd(0.5 * opening, axis) * (radius * across);
-    arc.angle = 2 * M_PI - opening;
-    arc.edges = edges;
-    rod.centerline = arc;
+    const Eigen::Vector3d start = center + Eigen::AngleAxisd(0.5 * opening, axis) * (radius * across);
+    const double angle = 2 * M_PI - opening;
+    rod.centerline = {edges, [=](int n, const Eigen::Vector3d&) { return arcCurve(center, start, axis, angle, n); }};
     rod.closed = opening == 0;
+    rod.edges = edges;
     rod.grasps.clear();
     for (int end = 0; end < 2; ++end)
     {
       if (k != (end == 0 ? 0 : links - 1))
         continue;
       Eigen::Index outermost = 0;
-      const Eigen::Matrix3Xd nodes = arcCurve(arc.center, arc.start, arc.axis, arc.angle, edges).leftCols(edges);
+      const Eigen::Matrix3Xd nodes = arcCurve(center, start, axis, angle, edges).leftCols(edges);
       (nodes.transpose() * (end == 0 ? -along : along)).maxCoeff(&outermost);
       GraspConfig grasp;
       grasp.name = name + (end == 0 ? "_start" : "_end");
@@ -53,7 +50,7 @@ void makeLinks(const Chain& chain, const Motion (&motions)[2], RodConfig rod, co
       grasp.attach = Attach::initial;
       rod.grasps.push_back(std::move(grasp));
     }
-    out.rods.emplace_back(ReadRod{rod, edges}, at);
+    out.rods.emplace_back(rod, at);
   }
 }
 

@@ -34,11 +34,11 @@ ObstacleConfig readHead(YamlMap& map, const ReadContext& context)
 }
 
 /// A helix of the given arc length about an axis through its root, turned about the axis by `phase` [rad].
-PolylineCurve curled(double length, double radius, double pitch, int edges, const Eigen::Vector3d& axis, double phase)
+Curve curled(double length, double radius, double pitch, int edges, const Eigen::Vector3d& axis, double phase)
 {
   const double turns = length / std::hypot(2 * M_PI * radius, pitch);
   const Eigen::Matrix3Xd helix = helixCurve(Eigen::Vector3d::Zero(), axis, radius, pitch, turns, edges);
-  PolylineCurve curve;
+  Curve curve;
   for (Eigen::Index i = 0; i < helix.cols(); ++i)
     curve.points.push_back(rotateAbout(helix.col(i), axis, phase));
   return curve;
@@ -82,6 +82,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
   if (!at_section.present())
     rod.cross_section = {{4e-5}, {4e-5}};
   rod.name = name;
+  rod.edges = edges;
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
   map.finish();
@@ -102,7 +103,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
         head.pose.orientation * (rho * (std::cos(azimuth) * e1 + std::sin(azimuth) * e2) + z * up);
     const Eigen::Vector3d root = head.pose.position + root_distance * out_W;
     const double own_length = length * (1 - variation * dice.between(0, 1));
-    const StraightCurve straight{root, root + own_length * out_W, edges, 1.0};
+    const Curve straight = straightLine(root, root + own_length * out_W, edges);
     rod.name = name + "_" + std::to_string(k);
     rod.centerline = straight;
     rod.initial = std::nullopt;
@@ -117,7 +118,7 @@ void generateHair(const YamlCursor& at, const ReadContext& context, Generated& o
     grasp.motion = BodyMotion{head.name};
     grasp.attach = Attach::initial;
     rod.grasps = {std::move(grasp)};
-    out.rods.emplace_back(ReadRod{rod, edges}, at);
+    out.rods.emplace_back(rod, at);
   }
   out.obstacles.emplace_back(std::move(head), at);
 }

@@ -216,9 +216,10 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       const double u = static_cast<double>(i) / (branch.nodes - 1);
       points[b].push_back(branch.root + branch.length * (u * branch.direction + 0.15 * u * u * tree.up));
     }
-    rod.centerline = PolylineCurve{points[b], std::nullopt};
+    rod.centerline = {std::nullopt, nullptr, points[b]};
     rod.cross_section.a = rod.cross_section.b = {branch.radius, tree.taper * branch.radius};
-    out.rods.emplace_back(ReadRod{rod, branch.nodes - 1}, at);
+    rod.edges = branch.nodes - 1;
+    out.rods.emplace_back(rod, at);
   }
 }
 

@@ -1,7 +1,5 @@
 // Keys that are sound but do nothing beside the other keys of the scene: each is warned of, so that nobody believes in
 // an effect.
-#include "ignored_keys.h"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <functional>
 #include <limits>
 
 #include "yaml_tree.h"
@@ -30,7 +29,7 @@ std::string KeyLog::general(const std::string& path, bool& own) const
 {
   own = true;
   std::string result;
-  for (const std::string& part : path.empty() ? std::vector<std::string>() : splitPath(path))
+  for (const std::string& part : path.empty() ? std::vector<std::string>() : split(path, '.'))
   {
     const auto owner = shared_.find(result);
     if (owner != shared_.end())
@@ -99,44 +98,28 @@ void KeyLog::note(const std::string& path, const std::string& what)
 
 std::vector<SceneKey> KeyLog::keys() const
 {
-  std::vector<const Entry*> entries;
+  // By the places of a key and of all keys that it is part of; places in lists are not asked for themselves.
+  std::map<std::vector<std::pair<long, std::size_t>>, const Entry*> sorted;
   for (const Entry& entry : entries_)
-    entries.push_back(&entry);
-  std::stable_sort(entries.begin(), entries.end(), [](const Entry* a, const Entry* b) { return a->order < b->order; });
-  std::map<std::string, std::vector<const Entry*>> children;
-  std::map<std::string, bool> asked;
-  for (const Entry* entry : entries)
-    asked[entry->key.path] = true;
-  for (const Entry* entry : entries)
   {
-    // places of a list are not asked for themselves, only what they hold
-    std::string parent = parentOf(entry->key.path);
-    while (!parent.empty() && !asked.count(parent))
-      parent = parentOf(parent);
-    children[parent].push_back(entry);
+    std::vector<std::pair<long, std::size_t>> place;
+    for (std::string path = entry.key.path; !path.empty(); path = parentOf(path))
+      if (const auto asked = places_.find(path); asked != places_.end())
+        place.insert(place.begin(), {entries_[asked->second].order, asked->second});
+    sorted[place] = &entry;
   }
   std::vector<SceneKey> result;
-  const std::function<void(const Entry&)> add = [&](const Entry& entry) {
-    const std::vector<const Entry*>& below = children[entry.key.path];
-    result.push_back(entry.key);
-    SceneKey& key = result.back();
-    const auto isEntryOfList = [&](const Entry* child) { return child->key.path == entry.key.path + ".N"; };
-    const auto item = std::find_if(below.begin(), below.end(), isEntryOfList);
-    if (item != below.end() && key.what.empty() && !(*item)->key.what.empty())
-      key.what = "a list, each entry " + (*item)->key.what;
-    for (const Entry* child : below)
-    {
-      if (!isEntryOfList(child))
-        add(*child);
-      else
-        for (const Entry* part : children[child->key.path])
-          if (part->key.path != child->key.path + ".N")
-            add(*part);
-    }
-  };
-  for (const Entry* entry : children[""])
-    if (!entry->key.path.empty())
-      add(*entry);
+  for (const auto& [place, entry] : sorted)
+  {
+    const std::string& path = entry->key.path;
+    if (path.empty() || joined(parentOf(path), "N") == path)
+      continue;
+    result.push_back(entry->key);
+    const auto item = places_.find(path + ".N");
+    std::string& what = result.back().what;
+    if (item != places_.end() && what.empty() && !entries_[item->second].key.what.empty())
+      what = "a list, each entry " + entries_[item->second].key.what;
+  }
   return result;
 }
 

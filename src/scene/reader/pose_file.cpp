@@ -1,5 +1,6 @@
 #include "slender_sim/scene/pose_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -16,20 +17,6 @@ namespace {
 
 constexpr double quaternion_slack = 0.01;
 constexpr double largest_turn = 0.99 * M_PI;   // [rad] between two samples
-
-std::vector<std::string> splitCells(const std::string& line)
-{
-  std::vector<std::string> cells;
-  std::size_t begin = 0;
-  while (true)
-  {
-    const std::size_t comma = line.find(',', begin);
-    cells.push_back(trimmed(line.substr(begin, comma == std::string::npos ? comma : comma - begin)));
-    if (comma == std::string::npos)
-      return cells;
-    begin = comma + 1;
-  }
-}
 
 double number(const std::string& cell, const char* column)
 {
@@ -64,7 +51,8 @@ void readTable(const std::string& path, const std::vector<std::string>& columns,
     line = trimmed(line);
     if (line.empty() || line[0] == '#')
       continue;
-    const auto cells = splitCells(line);
+    std::vector<std::string> cells = split(line, ',');
+    std::transform(cells.begin(), cells.end(), cells.begin(), trimmed);
     const bool header = first && cells == columns;
     first = false;
     if (header)

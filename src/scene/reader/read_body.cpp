@@ -80,7 +80,7 @@ void readMass(YamlMap& map, bool shape_given, BodyConfig& body)
   (at_inertia.present() ? at_inertia : mass.present() ? mass : density).attempt([&] { checkBody(body); });
 }
 
-std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadRod>& rods)
+std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<RodConfig>& rods)
 {
   YamlMap map(at);
   const YamlCursor at_rod = map.require("rod", "Name of the rod that the body holds.");
@@ -90,11 +90,11 @@ std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadR
   const auto name = at_rod.text();
   if (!name)
     return std::nullopt;
-  const auto found = std::find_if(rods.begin(), rods.end(), [&](const ReadRod& rod) { return rod.name == *name; });
+  const auto found = std::find_if(rods.begin(), rods.end(), [&](const RodConfig& rod) { return rod.name == *name; });
   if (found == rods.end())
   {
     std::vector<std::string> names;
-    for (const ReadRod& rod : rods)
+    for (const RodConfig& rod : rods)
       names.push_back(rod.name);
     return at_rod.problem("is no rod of the scene" + didYouMean(*name, names) + "; it has: " + joinWords(names, 10));
   }
@@ -105,7 +105,7 @@ std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<ReadR
     return std::nullopt;
   const std::size_t before = edge.problems().size();
   const int held = *index < 0 ? *index + edges : *index;
-  const auto [first, last] = nodesOfEdges(edge, held, held, found->closed, edges);
+  const auto [first, last] = nodesOfEdges(edge, held, held, *found);
   return edge.problems().size() == before
              ? std::optional<WeldConfig>({static_cast<int>(found - rods.begin()), first, last})
              : std::nullopt;
@@ -171,7 +171,7 @@ BodyConfig readBody(const YamlCursor& at, const ReadContext& context, const std:
 }
 
 /// Nodes of one rod may be held only once, by grasps and welds together.
-void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<ReadRod>& rods,
+void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<RodConfig>& rods,
                const std::vector<BodyConfig>& bodies)
 {
   const auto overlaps = [&](int first, int last) { return weld.first_node <= last && first <= weld.last_node; };
@@ -191,7 +191,7 @@ void checkWeld(const YamlCursor& at, const WeldConfig& weld, const std::vector<R
 
 }   // namespace
 
-std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods)
+std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<RodConfig>& rods)
 {
   std::vector<BodyConfig> bodies;
   const auto entries = at.items(0, 100'000);

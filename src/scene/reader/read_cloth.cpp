@@ -297,35 +297,6 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, ClothConfig& c
   }
 }
 
-ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
-{
-  ClothConfig cloth;
-  cloth.name = default_name;
-  cloth.place = at.place();
-  YamlMap map(at);
-  map.getName(cloth.name,
-              "Name of the cloth, which topics, tables and other keys use. Without the key: cloth if there is one "
-              "cloth, otherwise cloth0, cloth1, ...");
-  const YamlCursor grid = map.get("grid", "Rectangle of cloth. Give either `grid` or `mesh`.");
-  const YamlCursor mesh = map.get("mesh", "Mesh of the undeformed cloth from a file. Give either `grid` or `mesh`.");
-  const bool one = map.hasOne(
-      {grid, mesh}, "must have either grid: {corner: [...], sides: [[...], [...]], cells: N} or mesh: {file: PATH}");
-  if (one && grid.present())
-  {
-    cloth.grid = readClothGrid(grid, context, cloth.mesh);
-    cloth.warp = cloth.grid ? Eigen::Vector3d(cloth.grid->sides[0].normalized()) : cloth.warp;
-  }
-  else if (one && !readClothMesh(mesh, context, cloth.mesh))
-  {
-    cloth.mesh = TriangleMesh{};
-  }
-  readClothTraits(map, context, cloth);
-  cloth.loads = readClothLoads(
-      map.get("loads", "Forces on vertices that act all the time, in steps and in statics. Without the key: none."),
-      cloth);
-  return cloth;
-}
-
 }   // namespace
 
 void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& cloth)
@@ -386,11 +357,33 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
       "cloths", true);
 }
 
-std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context)
+ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
-  return readNamed<ClothConfig>(at, 1000, "cloth", [&](const YamlCursor& entry, const std::string& default_name) {
-    return readCloth(entry, context, default_name);
-  });
+  ClothConfig cloth;
+  cloth.name = default_name;
+  cloth.place = at.place();
+  YamlMap map(at);
+  map.getName(cloth.name,
+              "Name of the cloth, which topics, tables and other keys use. Without the key: cloth if there is one "
+              "cloth, otherwise cloth0, cloth1, ...");
+  const YamlCursor grid = map.get("grid", "Rectangle of cloth. Give either `grid` or `mesh`.");
+  const YamlCursor mesh = map.get("mesh", "Mesh of the undeformed cloth from a file. Give either `grid` or `mesh`.");
+  const bool one = map.hasOne(
+      {grid, mesh}, "must have either grid: {corner: [...], sides: [[...], [...]], cells: N} or mesh: {file: PATH}");
+  if (one && grid.present())
+  {
+    cloth.grid = readClothGrid(grid, context, cloth.mesh);
+    cloth.warp = cloth.grid ? Eigen::Vector3d(cloth.grid->sides[0].normalized()) : cloth.warp;
+  }
+  else if (one && !readClothMesh(mesh, context, cloth.mesh))
+  {
+    cloth.mesh = TriangleMesh{};
+  }
+  readClothTraits(map, context, cloth);
+  cloth.loads = readClothLoads(
+      map.get("loads", "Forces on vertices that act all the time, in steps and in statics. Without the key: none."),
+      cloth);
+  return cloth;
 }
 
 }   // namespace slender

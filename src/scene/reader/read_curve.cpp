@@ -1,10 +1,9 @@
 #include <algorithm>
-#include <type_traits>
+#include <stdexcept>
 
 #include "read_parts.h"
-
+#include "slender_sim/geometry/curves.h"
 #include "slender_sim/scene/pose_file.h"
-#include "slender_sim/scene/reader.h"
 
 namespace slender {
 
@@ -24,124 +23,138 @@ std::vector<Eigen::Vector3d> readPoints(const YamlCursor& at)
   return points;
 }
 
-StraightCurve readStraight(YamlMap& map)
+Curve readStraight(YamlMap& map)
 {
-  StraightCurve curve;
-  map.get("from", curve.from, kCoordinate, "First node. Without the key: [0, 0, 0].");
-  map.get("to", curve.to, kCoordinate, "Last node. Without the key: [1, 0, 0].");
-  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
-  map.get("grading", curve.grading, Range::closed(0.01, 100),
+  Eigen::Vector3d from(0, 0, 0), to(1, 0, 0);
+  double grading = 1;
+  map.get("from", from, kCoordinate, "First node. Without the key: [0, 0, 0].");
+  map.get("to", to, kCoordinate, "Last node. Without the key: [1, 0, 0].");
+  const int edges = readEdges(map, "Number of edges. Without the key: 50.").value_or(50);
+  map.get("grading", grading, Range::closed(0.01, 100),
           "Length of the last edge over that of the first. Without the key: 1, all edges are equally long.");
-  if (!((curve.to - curve.from).norm() > 0))
+  if (!((to - from).norm() > 0))
     map.at().problem("from and to are the same point; must differ");
-  return curve;
+  return straightLine(from, to, edges, grading);
 }
 
-PolylineCurve readPolyline(YamlMap& map)
+Curve readPolyline(YamlMap& map)
 {
-  PolylineCurve curve;
+  Curve curve;
   curve.points = readPoints(map.require(
       "points", "Points [x, y, z] through which the polyline runs. They are the nodes, unless `edges` is given."));
   curve.edges = readEdges(map, "Number of edges of equal length. Without the key the points are the nodes.");
   return curve;
 }
 
-ArcCurve readArc(YamlMap& map)
+Curve readArc(YamlMap& map)
 {
-  ArcCurve curve;
-  map.get("center", curve.center, kCoordinate, "Centre of the circle. Without the key: [0, 0, 0].");
-  map.get("start", curve.start, kCoordinate, "First node. Without the key: [1, 0, 0].");
-  map.get("axis", curve.axis, kCoordinate,
-          "Axis about which the arc turns, through `center`. Without the key: [0, 0, 1].");
-  const YamlCursor angle =
-      map.get("angle", curve.angle, Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad"),
+  Eigen::Vector3d center(0, 0, 0), start(1, 0, 0), axis(0, 0, 1);
+  double angle = 1;
+  map.get("center", center, kCoordinate, "Centre of the circle. Without the key: [0, 0, 0].");
+  map.get("start", start, kCoordinate, "First node. Without the key: [1, 0, 0].");
+  map.get("axis", axis, kCoordinate, "Axis about which the arc turns, through `center`. Without the key: [0, 0, 1].");
+  const YamlCursor at_angle =
+      map.get("angle", angle, Range::closed(-2e5 * M_PI, 2e5 * M_PI, "rad"),
               "Angle of the arc, positive by the right-hand rule about `axis`. Without the key: 1 rad.");
-  if (curve.angle == 0)
-    angle.problem("must not be zero");
-  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
+  if (angle == 0)
+    at_angle.problem("must not be zero");
+  const int edges = readEdges(map, "Number of edges. Without the key: 50.").value_or(50);
   // Edges that turn by half a turn or more each lie the wrong way round the circle, or fold back.
-  if (std::abs(curve.angle) >= 0.999 * M_PI * curve.edges)
+  if (std::abs(angle) >= 0.999 * M_PI * edges)
   {
-    angle.problem("is too much for " + std::to_string(curve.edges) +
-                  " edges, each of which may turn by less than pi; give edges of at least " +
-                  std::to_string(static_cast<long>(std::abs(curve.angle) / (0.999 * M_PI)) + 1));
+    at_angle.problem("is too much for " + std::to_string(edges) +
+                     " edges, each of which may turn by less than pi; give edges of at least " +
+                     std::to_string(static_cast<long>(std::abs(angle) / (0.999 * M_PI)) + 1));
   }
-  return curve;
+  return {edges, [=](int n, const Eigen::Vector3d&) { return arcCurve(center, start, axis, angle, n); }};
 }
 
-HelixCurve readHelix(YamlMap& map)
+Curve readHelix(YamlMap& map)
 {
-  HelixCurve curve;
-  map.get("center", curve.center, kCoordinate, "Foot of the axis, beside the first node. Without the key: [0, 0, 0].");
-  map.get("axis", curve.axis, kCoordinate, "Direction of the axis. Without the key: [0, 0, 1].");
-  map.get("radius", curve.radius, kLength, "Radius of the helix. Without the key: 0.1 m.");
-  map.get("pitch", curve.pitch, kCoordinate, "Rise along the axis per turn. Without the key: 0.05 m.");
-  const YamlCursor turns = map.get("turns", curve.turns, Range::closed(-1e5, 1e5),
-                                   "Number of turns; negative for a left-handed helix. Without the key: 3.");
-  if (curve.turns == 0)
-    turns.problem("must not be zero; negative turns give a left-handed helix");
-  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 150."));
-  return curve;
+  Eigen::Vector3d center(0, 0, 0), axis(0, 0, 1);
+  double radius = 0.1, pitch = 0.05, turns = 3;
+  map.get("center", center, kCoordinate, "Foot of the axis, beside the first node. Without the key: [0, 0, 0].");
+  map.get("axis", axis, kCoordinate, "Direction of the axis. Without the key: [0, 0, 1].");
+  map.get("radius", radius, kLength, "Radius of the helix. Without the key: 0.1 m.");
+  map.get("pitch", pitch, kCoordinate, "Rise along the axis per turn. Without the key: 0.05 m.");
+  const YamlCursor at_turns = map.get("turns", turns, Range::closed(-1e5, 1e5),
+                                      "Number of turns; negative for a left-handed helix. Without the key: 3.");
+  if (turns == 0)
+    at_turns.problem("must not be zero; negative turns give a left-handed helix");
+  const int edges = readEdges(map, "Number of edges. Without the key: 150.").value_or(150);
+  return {edges, [=](int n, const Eigen::Vector3d&) { return helixCurve(center, axis, radius, pitch, turns, n); }};
 }
 
-CatenaryCurve readCatenary(YamlMap& map)
+/// The chain hangs along gravity, without gravity along -z.
+Curve readCatenary(YamlMap& map)
 {
-  CatenaryCurve curve;
-  map.get("from", curve.from, kCoordinate, "First node. Without the key: [0, 0, 0].");
-  map.get("to", curve.to, kCoordinate, "Last node. Without the key: [1, 0, 0].");
-  map.get("length", curve.length, kLength,
+  Eigen::Vector3d from(0, 0, 0), to(1, 0, 0);
+  double length = 1.2;
+  map.get("from", from, kCoordinate, "First node. Without the key: [0, 0, 0].");
+  map.get("to", to, kCoordinate, "Last node. Without the key: [1, 0, 0].");
+  map.get("length", length, kLength,
           "Length of the hanging chain; not shorter than the distance of its ends. Without the key: 1.2 m.");
-  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 50."));
-  return curve;
+  const int edges = readEdges(map, "Number of edges. Without the key: 50.").value_or(50);
+  return {edges, [=](int n, const Eigen::Vector3d& gravity) {
+            return catenaryCurve(from, to, length, gravity.norm() > 0 ? gravity : Eigen::Vector3d(0, 0, -1), n);
+          }};
 }
 
-TrefoilCurve readTrefoil(YamlMap& map)
+Curve readTrefoil(YamlMap& map)
 {
-  TrefoilCurve curve;
-  map.get("center", curve.center, kCoordinate,
+  Eigen::Vector3d center(0, 0, 0), axis(1, 0, 0), up(0, 0, 1);
+  double radius = 0.1, length = 1.5;
+  std::optional<double> separation;
+  bool left_handed = false;
+  map.get("center", center, kCoordinate,
           "Centre of the knot, on the line of its two tails. Without the key: [0, 0, 0].");
-  map.get("axis", curve.axis, kCoordinate, "Direction of the two tails. Without the key: [1, 0, 0].");
-  map.get("up", curve.up, kCoordinate, "Direction away from which the loop lies. Without the key: [0, 0, 1].");
-  map.get("radius", curve.radius, kLength, "Radius of the loop. Without the key: 0.1 m.");
-  map.get("separation", curve.separation, kLength,
+  map.get("axis", axis, kCoordinate, "Direction of the two tails. Without the key: [1, 0, 0].");
+  map.get("up", up, kCoordinate, "Direction away from which the loop lies. Without the key: [0, 0, 1].");
+  map.get("radius", radius, kLength, "Radius of the loop. Without the key: 0.1 m.");
+  map.get("separation", separation, kLength,
           "Distance of the two strands where they wind about each other. Without the key: an eighth of the radius.");
-  map.get("length", curve.length, kLength, "Length of the whole curve. Without the key: 1.5 m.");
-  map.get("left_handed", curve.left_handed, "Whether the knot is the mirror image. Without the key: false.");
-  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 150."));
-  return curve;
+  map.get("length", length, kLength, "Length of the whole curve. Without the key: 1.5 m.");
+  map.get("left_handed", left_handed, "Whether the knot is the mirror image. Without the key: false.");
+  const int edges = readEdges(map, "Number of edges. Without the key: 150.").value_or(150);
+  return {edges, [=](int n, const Eigen::Vector3d&) {
+            return trefoilCurve(center, axis, up, radius, separation.value_or(radius / 8), length, left_handed, n);
+          }};
 }
 
-TorusKnotCurve readTorusKnot(YamlMap& map)
+Curve readTorusKnot(YamlMap& map)
 {
-  TorusKnotCurve curve;
-  map.get("center", curve.center, kCoordinate, "Centre of the knot. Without the key: [0, 0, 0].");
-  map.get("axis", curve.axis, kCoordinate, "Axis of the torus. Without the key: [0, 0, 1].");
-  map.get("radius", curve.radius, kLength,
-          "Radius of the circle around which the curve winds. Without the key: 0.1 m.");
-  map.get("tube_radius", curve.tube_radius, kLength,
-          "Distance of the curve from that circle. Without the key: 0.04 m.");
-  map.get("around", curve.around, Range::closed(1, 1000), "Number of turns about the axis. Without the key: 2.");
-  map.get("through", curve.through, Range::closed(1, 1000),
+  Eigen::Vector3d center(0, 0, 0), axis(0, 0, 1);
+  double radius = 0.1, tube = 0.04;
+  int around = 2, through = 3;
+  map.get("center", center, kCoordinate, "Centre of the knot. Without the key: [0, 0, 0].");
+  map.get("axis", axis, kCoordinate, "Axis of the torus. Without the key: [0, 0, 1].");
+  map.get("radius", radius, kLength, "Radius of the circle around which the curve winds. Without the key: 0.1 m.");
+  map.get("tube_radius", tube, kLength, "Distance of the curve from that circle. Without the key: 0.04 m.");
+  map.get("around", around, Range::closed(1, 1000), "Number of turns about the axis. Without the key: 2.");
+  map.get("through", through, Range::closed(1, 1000),
           "Number of turns about the circle. Without the key: 3, which with `around` 2 is the closed trefoil.");
-  assign(curve.edges, readEdges(map, "Number of edges. Without the key: 120."));
-  return curve;
+  const int edges = readEdges(map, "Number of edges. Without the key: 120.").value_or(120);
+  return {edges, [=](int n, const Eigen::Vector3d&) {
+            return torusKnotCurve(center, axis, radius, tube, around, through, n);
+          }};
 }
 
-VeeCurve readVee(YamlMap& map)
+Curve readVee(YamlMap& map)
 {
-  VeeCurve curve;
-  map.get("tip", curve.tip, kCoordinate, "Point where the two arms meet. Without the key: [0, 0, 0].");
-  map.get("direction", curve.direction, kCoordinate, "Direction between the arms. Without the key: [1, 0, 0].");
-  map.get("normal", curve.normal, kCoordinate, "Normal of the plane of the arms. Without the key: [0, 0, 1].");
-  map.get("arm", curve.arm, kLength, "Length of each arm. Without the key: 0.5 m.");
-  map.get("angle", curve.angle, Range::between(0, M_PI, "rad"), "Angle between the arms. Without the key: pi/2.");
-  assign(curve.edges, readEdges(map, "Number of edges, an even one. Without the key: 50."));
-  return curve;
+  Eigen::Vector3d tip(0, 0, 0), direction(1, 0, 0), normal(0, 0, 1);
+  double arm = 0.5, angle = M_PI / 2;
+  map.get("tip", tip, kCoordinate, "Point where the two arms meet. Without the key: [0, 0, 0].");
+  map.get("direction", direction, kCoordinate, "Direction between the arms. Without the key: [1, 0, 0].");
+  map.get("normal", normal, kCoordinate, "Normal of the plane of the arms. Without the key: [0, 0, 1].");
+  map.get("arm", arm, kLength, "Length of each arm. Without the key: 0.5 m.");
+  map.get("angle", angle, Range::between(0, M_PI, "rad"), "Angle between the arms. Without the key: pi/2.");
+  const int edges = readEdges(map, "Number of edges, an even one. Without the key: 50.").value_or(50);
+  return {edges, [=](int n, const Eigen::Vector3d&) { return veeCurve(tip, direction, normal, arm, angle, n); }};
 }
 
-PolylineCurve readFile(YamlMap& map, const ReadContext& context)
+Curve readFile(YamlMap& map, const ReadContext& context)
 {
-  PolylineCurve curve;
+  Curve curve;
   const YamlCursor path =
       map.require("path", "CSV file with a point x,y,z per line. The points are the nodes, unless `edges` is given.");
   curve.edges = readEdges(map, "Number of edges of equal length. Without the key the points are the nodes.");
@@ -157,16 +170,6 @@ PolylineCurve readFile(YamlMap& map, const ReadContext& context)
     });
   }
   return curve;
-}
-
-/// That a rod along it gets at least.
-template <class CurveKind>
-double edgesOf(const CurveKind& curve)
-{
-  if constexpr (std::is_same_v<CurveKind, PolylineCurve>)
-    return std::max(curve.edges.value_or(0), static_cast<int>(curve.points.size()));
-  else
-    return curve.edges;
 }
 
 }   // namespace
@@ -186,8 +189,9 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
   kinds.add("vee", "Two straight arms that meet at a tip.", readVee);
   kinds.add("file", "A polyline through the points of a file.", [&](YamlMap& map) { return readFile(map, context); });
   const std::optional<Curve> curve = kinds.read("curves");
-  const auto edges = [](const auto& kind) { return edgesOf(kind); };
-  return curve && context.claim(kinds.value(), std::visit(edges, *curve)) ? curve : std::nullopt;
+  // a rod along it gets at least so many edges
+  const auto edges = [](const Curve& c) { return std::max(c.edges.value_or(0), static_cast<int>(c.points.size())); };
+  return curve && context.claim(kinds.value(), edges(*curve)) ? curve : std::nullopt;
 }
 
 }   // namespace slender

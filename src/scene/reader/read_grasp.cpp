@@ -19,7 +19,7 @@ std::optional<std::pair<int, int>> readIndices(const YamlCursor& at, int count)
   return std::make_pair(indices.front(), indices.back());
 }
 
-void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
+void readHeldNodes(YamlMap& map, GraspConfig& grasp, const RodConfig& rod)
 {
   const YamlCursor edge_list =
       map.get("edges",
@@ -36,18 +36,13 @@ void readHeldNodes(YamlMap& map, GraspConfig& grasp, bool closed, int edges)
     return;
   if (node_list.present())
   {
-    const int nodes = edges == 0 ? 0 : edges + (closed ? 0 : 1);
-    if (const auto held = readIndices(node_list, nodes))
-    {
-      grasp.first_node = held->first;
-      grasp.last_node = held->second;
-    }
+    if (const auto held = readIndices(node_list, rod.nodes()))
+      std::tie(grasp.first_node, grasp.last_node) = *held;
     return;
   }
-  const auto held = readIndices(edge_list, edges);
-  if (!held || edges == 0)
-    return;
-  std::tie(grasp.first_node, grasp.last_node) = nodesOfEdges(edge_list, held->first, held->second, closed, edges);
+  const auto held = readIndices(edge_list, rod.edges);
+  if (held && rod.edges > 0)
+    std::tie(grasp.first_node, grasp.last_node) = nodesOfEdges(edge_list, held->first, held->second, rod);
 }
 
 /// `direction` and `director` of a clamped section. They stand in for the orientation of poses that have none.
@@ -182,14 +177,15 @@ std::vector<int> readIndexList(const YamlCursor& at, int count)
   return indices;
 }
 
-std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges)
+std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, const RodConfig& rod)
 {
-  if (!closed && first == last && (first == 0 || first == edges - 1))
+  const int edges = rod.edges;
+  if (!rod.closed && first == last && (first == 0 || first == edges - 1))
   {
     // The end section itself, not half an edge further in.
     return first == 0 ? std::make_pair(0, 0) : std::make_pair(edges, edges);
   }
-  if (closed && last + 1 == edges)
+  if (rod.closed && last + 1 == edges)
   {
     at.problem("holds the edge that joins the last node to the first; hold an edge in [0, " +
                std::to_string(edges - 2) + "]");
@@ -236,12 +232,12 @@ void checkIgnoredContacts(const SceneConfig& scene, const std::vector<ListedGras
       }
 }
 
-GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed, int edges)
+GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, const RodConfig& rod)
 {
   GraspConfig grasp;
   grasp.name = name;
   YamlMap map(at);
-  readHeldNodes(map, grasp, closed, edges);
+  readHeldNodes(map, grasp, rod);
   const YamlCursor hold = map.get("hold", grasp.hold, {{"frame", Hold::frame}, {"position", Hold::position}},
                                   "`frame` clamps position and material frame. `position` pins the position of one "
                                   "node, which can turn freely. Without the key: frame.");

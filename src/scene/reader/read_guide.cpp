@@ -7,7 +7,6 @@
 #include "slender_sim/geometry/mesh_defects.h"
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/pose_file.h"
-#include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/recorded_guide.h"
 
 namespace slender {

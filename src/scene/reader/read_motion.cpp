@@ -1,7 +1,6 @@
 
 #include "read_parts.h"
 #include "slender_sim/scene/pose_file.h"
-#include "slender_sim/scene/reader.h"
 
 namespace slender {
 

@@ -42,28 +42,29 @@ inline std::vector<YamlCursor> entriesOf(const YamlCursor& list)
 }
 /// Reports a name that another object has. `names` says what has each of them.
 void takeName(std::map<std::string, std::string>& names, const YamlCursor& entry, const std::string& name);
-/// Reads the entries of a list by read(entry, default name). The default name is `word`, with a number if there are
-/// several entries. Reports a list of fewer or more entries; none if there is no list.
-template <class Object, class Read>
-std::vector<Object> readEach(const YamlCursor& list, std::size_t fewest, std::size_t most, const std::string& word,
-                             const Read& read)
+/// Reads the entries of a list by read(entry, context, default name). The default name is `word`, with a number if
+/// there are several entries. Reports a list of fewer or more entries; none if there is no list.
+template <class Read>
+auto readEach(const YamlCursor& list, std::size_t fewest, std::size_t most, const std::string& word,
+              const ReadContext& context, const Read& read)
 {
-  std::vector<Object> objects;
+  std::vector<decltype(read(list, context, word))> objects;
   const std::vector<YamlCursor> entries = list.items(fewest, most);
   for (const YamlCursor& entry : entries)
-    objects.push_back(read(entry, entries.size() == 1 ? word : word + std::to_string(objects.size())));
+    objects.push_back(read(entry, context, entries.size() == 1 ? word : word + std::to_string(objects.size())));
   return objects;
 }
 /// The same for objects that may not have the names of others of them, or those in `names`.
-template <class Object, class Read>
-std::vector<Object> readNamed(const YamlCursor& list, std::size_t most, const std::string& word, const Read& read,
-                              std::map<std::string, std::string> names = {})
+template <class Read>
+auto readNamed(const YamlCursor& list, std::size_t most, const std::string& word, const ReadContext& context,
+               const Read& read, std::map<std::string, std::string> names = {})
 {
-  return readEach<Object>(list, 1, most, word, [&](const YamlCursor& entry, const std::string& default_name) {
-    Object object = read(entry, default_name);
+  const auto readOne = [&](const YamlCursor& entry, const ReadContext&, const std::string& default_name) {
+    auto object = read(entry, context, default_name);
     takeName(names, entry, object.name);
     return object;
-  });
+  };
+  return readEach(list, 1, most, word, context, readOne);
 }
 /// A map with one key, which says of which kind a thing is, and whose value has the keys of this kind.
 template <class Thing>
@@ -110,42 +111,34 @@ void requireCoordinates(const Eigen::Matrix3Xd& points, const std::string& what 
 /// `count` 0: not known, not checked. Empty when reported.
 std::vector<int> readIndexList(const YamlCursor& at, int count);
 std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context);
-/// `edges` of the rod, or 0 when its centreline could not be read: then indices are not checked.
 /// Nodes held when edges first..last of the rod are (see GraspConfig); reports the joining edge of a closed rod.
-std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, bool closed, int edges);
+std::pair<int, int> nodesOfEdges(const YamlCursor& at, int first, int last, const RodConfig& rod);
 /// Returns true if the entry of a grasp gives its pose in the frame that it follows.
 bool givesOffset(const YamlMap& grasp);
 /// Reads `offset` of a grasp. Call it after `motion` and `attach` were read. Reports an offset that does not fit them.
 void readOffset(YamlMap& map, GraspConfig& grasp);
 LimitsConfig readLimits(const YamlCursor& at);
 GraspLimits readGraspLimits(const YamlCursor& at);
-GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, bool closed,
-                      int edges);
-/// Point loads of a rod with so many edges (0: not known).
-std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, bool closed, int edges);
+GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, const RodConfig& rod);
+/// Point loads of a rod.
+std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, const RodConfig& rod);
 CrossSection readCrossSection(const YamlCursor& at, int edges);
 /// Warns that contact treats elliptical sections of a rod as circles. Call this after its cross-section and its contact
 /// have been read.
 void warnOfRoundContact(const YamlCursor& at_section, const RodConfig& rod);
 Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
-/// A rod, and how many edges it has: 0 when its centreline could not be read.
-struct ReadRod : RodConfig
-{
-  int edges = 0;
-};
 /// What rods of a scene and those of a generator have in common: curvature, formulation, material, damping, contact.
 void readTraits(YamlMap& map, RodConfig& rod);
-/// `track` of a rod with so many edges (0: not known), all else of which has been read; null without it, or when
-/// something was reported.
+/// `track` of a rod, all else of which has been read; null without it, or when something was reported.
 std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context,
-                                                       const RodConfig& rod, int edges);
-ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
+                                                       const RodConfig& rod);
+RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 
 /// What the generators of a scene make, each with the place that asked for it. Welds count rods from `first_rod`.
 struct Generated
 {
-  std::vector<std::pair<ReadRod, YamlCursor>> rods;
+  std::vector<std::pair<RodConfig, YamlCursor>> rods;
   std::vector<std::pair<ObstacleConfig, YamlCursor>> obstacles;
   std::vector<std::pair<BodyConfig, YamlCursor>> bodies;
 };
@@ -178,28 +171,32 @@ std::optional<Shape> readShape(const YamlCursor& at, const ReadContext& context,
 /// What a rod, a thread or a cloth touches. `others`: the key for contact with objects of the same kind. Cloth has the
 /// keys `thickness` and `method` as well.
 std::optional<ContactProperties> readContactProperties(const YamlCursor& at, const char* others, bool of_cloth = false);
-std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context);
+ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 /// Chooses the edges and the break-up radius of threads whose entries `at` do not give them, and says what is not
 /// resolved. All other objects of the scene, its gravity and its time have been read.
 void completeThreads(SceneConfig& scene, const std::vector<YamlCursor>& at);
-std::vector<ClothConfig> readCloths(const YamlCursor& at, const ReadContext& context);
+ClothConfig readCloth(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 /// The list `tracked`: appends to the cloths.
 void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::vector<ClothConfig>& cloths);
 /// The contact methods of the cloths have been chosen.
 ContactConfig readContact(const YamlCursor& at, const SceneConfig& scene);
-std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context);
+ObstacleConfig readObstacle(const YamlCursor& at, const ReadContext& context, const std::string& default_name);
 /// Reads robots. Returns the obstacles for their collision shapes, each with the entry of its robot.
 std::vector<std::pair<ObstacleConfig, YamlCursor>> readRobots(const YamlCursor& at, const ReadContext& context);
 /// Replaces names of ROS parameters in `robot` by their texts, so that the scene is complete. Returns true if there
 /// were such names. `directory` is the folder of the scene.
 bool takeRobotParameters(YamlTree& scene, const std::string& directory);
-std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context, const std::vector<ReadRod>& rods);
+std::vector<BodyConfig> readBodies(const YamlCursor& at, const ReadContext& context,
+                                   const std::vector<RodConfig>& rods);
 TimeConfig readTime(const YamlCursor& at);
 /// Chooses the integrator if the scene names none. Reports integrators and options that the objects of the scene do not
 /// support. Call it when all objects are read. `time` is the value of the key `time`.
 void chooseIntegrator(YamlMap& map, const YamlCursor& time, SceneConfig& scene);
 RecordConfig readRecord(const YamlCursor& at);
 StartConfig readStart(const YamlCursor& at);
+/// Warns of keys of a sound scene that do nothing beside its other keys. `map`: the whole scene, from which `scene` was
+/// read.
+void warnOfIgnoredKeys(YamlMap& map, const SceneConfig& scene);
 /// Nothing without the key.
 std::optional<StaticsConfig> readStatics(const YamlCursor& at);
 /// Reports what statics cannot do with this scene; called when all objects have been read.

@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "read_parts.h"
-#include "slender_sim/scene/record_fields.h"
 #include "slender_sim/scene/shapes.h"
 
 namespace slender {
@@ -23,8 +22,15 @@ RecordConfig readRecord(const YamlCursor& at)
   const YamlCursor fields = map.get("fields",
                                     "Quantities that are recorded in addition to the motion; docs/quantities.md "
                                     "defines them. Without the key nothing is computed or recorded in addition.");
+  const Choices<RecordField> names = {{"curvature", RecordField::curvature},
+                                      {"twist", RecordField::twist},
+                                      {"strain", RecordField::strain},
+                                      {"force", RecordField::force},
+                                      {"moment", RecordField::moment},
+                                      {"energy", RecordField::energy},
+                                      {"contact_force", RecordField::contact_force}};
   for (const YamlCursor& item : fields.items())
-    if (const auto field = item.choice(recordFieldNames()))
+    if (const auto field = item.choice(names))
     {
       if (std::find(record.fields.begin(), record.fields.end(), *field) != record.fields.end())
         item.problem("is named twice; leave one out");
@@ -39,24 +45,24 @@ void checkFields(const YamlCursor& fields, const SceneConfig& scene)
 {
   const bool bodies =
       std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyConfig& body) { return !body.motion; });
-  for (const YamlCursor& item : fields.items())
+  const std::vector<YamlCursor> items = fields.items();
+  for (std::size_t k = 0; k < items.size(); ++k)
   {
-    const auto field = item.choice(recordFieldNames());
-    if (!field)
-      continue;
-    if (*field == RecordField::energy && scene.rods.empty() && scene.cloths.empty() && !bodies)
+    const YamlCursor& item = items[k];
+    const RecordField field = scene.record.fields[k];
+    if (field == RecordField::energy && scene.rods.empty() && scene.cloths.empty() && !bodies)
       item.problem("is recorded of rods, cloths and simulated bodies, and the scene has none; leave it out");
-    if (*field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty() && scene.bodies.empty() &&
+    if (field == RecordField::contact_force && scene.rods.empty() && scene.cloths.empty() && scene.bodies.empty() &&
         scene.obstacles.empty())
       item.problem("is recorded of rods, cloths, bodies and obstacles, and the scene has none; leave it out");
     const bool of_threads =
-        *field == RecordField::curvature || *field == RecordField::strain || *field == RecordField::force;
-    if (*field < RecordField::energy && scene.rods.empty() && !(of_threads && !scene.threads.empty()))
+        field == RecordField::curvature || field == RecordField::strain || field == RecordField::force;
+    if (field < RecordField::energy && scene.rods.empty() && !(of_threads && !scene.threads.empty()))
       item.problem(of_threads ? "is recorded of rods and threads, and the scene has none; leave it out"
                               : "is recorded of rods, and the scene has none; leave it out");
     const auto projected = std::find_if(scene.rods.begin(), scene.rods.end(),
                                         [](const RodConfig& rod) { return rod.stretching == Stretching::projected; });
-    if (*field == RecordField::force && projected != scene.rods.end())
+    if (field == RecordField::force && projected != scene.rods.end())
       item.problem("is not known of rod " + projected->name +
                    ", whose edges keep their lengths by projection (stretching: projected): its tension is no function "
                    "of the state; leave it out, or take stretching: stiff");

@@ -5,8 +5,7 @@
 #include <stdexcept>
 
 #include "read_parts.h"
-#include "reader_log.h"
-#include "slender_sim/scene/reader.h"
+#include "scene_text.h"
 #include "urdf_model.h"
 
 namespace slender {

@@ -57,7 +57,7 @@ std::optional<Eigen::Matrix2d> readBendModulus(const YamlCursor& at)
   return B;
 }
 
-void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod, int edges)
+void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod)
 {
   if (!at.present())
     return;
@@ -66,10 +66,10 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
   {
     const std::size_t before = value.problems().size();
     value.checkOwnName(name);
-    GraspConfig grasp = readGrasp(name, value, context, rod.closed, edges);
+    GraspConfig grasp = readGrasp(name, value, context, rod);
     for (const GraspConfig& other : rod.grasps)
     {
-      if (value.problems().size() == before && edges > 0 && grasp.first_node <= other.last_node &&
+      if (value.problems().size() == before && rod.edges > 0 && grasp.first_node <= other.last_node &&
           other.first_node <= grasp.last_node)
       {
         value.problem("overlaps grasp " + other.name + ": it holds nodes " + std::to_string(grasp.first_node) + " to " +
@@ -81,8 +81,8 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
   }
 }
 
-/// Edges of the rod as its curves give them; 0 when they could not be read or do not make a rod.
-int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
+/// Reads the curves and counts the edges that they give. Leaves 0 when they could not be read or do not make a rod.
+void readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
 {
   const YamlCursor centerline =
       map.get("centerline",
@@ -99,13 +99,12 @@ int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
               "Direction of the first material axis d1 at the first edge; the part along the edge does not count. The "
               "other edges follow without twist. Without the key some normal is chosen.");
   if (map.at().problems().size() != before)
-    return 0;
-  int edges = 0;
+    return;
   const bool good = (centerline.present() ? centerline : map.at()).attempt([&] {
     const Eigen::Matrix3Xd rest = restNodes(rod, context.gravity);
-    edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
+    rod.edges = static_cast<int>(rod.closed ? rest.cols() : rest.cols() - 1);
     if (rest.cols() < 3)
-      throw std::invalid_argument("makes " + std::to_string(edges) + " edges; a rod needs at least 2 (closed: 3)");
+      throw std::invalid_argument("makes " + std::to_string(rod.edges) + " edges; a rod needs at least 2 (closed: 3)");
     const Eigen::VectorXd lengths = edgeLengths(rest, rod.closed);
     Eigen::Index shortest = 0;
     if (!(lengths.minCoeff(&shortest) > 1e-12 * lengths.maxCoeff()))
@@ -117,11 +116,11 @@ int readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
     if (rod.director.norm() > 0 && rod.director.cross(tangent).norm() < 1e-6 * rod.director.norm() * tangent.norm())
       director.problem("is along the first edge; must point away from it");
   });
-  return good ? edges : 0;
+  if (!good)
+    rod.edges = 0;
 }
 
-/// `rest_twist` and `natural_curvature` of a rod with so many edges (0: not known).
-void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
+void readNaturalFrames(YamlMap& map, RodConfig& rod)
 {
   const YamlCursor at_twist = map.get("rest_twist",
                                       "Natural twist of the rod: the turn of the material frames about the centreline "
@@ -132,7 +131,7 @@ void readNaturalFrames(YamlMap& map, RodConfig& rod, int edges)
               "Natural curvature [kappa1, kappa2] about d2 and -d1, in the frames that `rest_twist` turns: one pair "
               "for the whole rod, or a list of pairs, one per inner node (closed rod: per node). Without the key: the "
               "curvature of the centreline.");
-  const std::size_t joints = edges == 0 ? 0 : rod.closed ? edges : edges - 1;
+  const std::size_t joints = rod.edges == 0 || rod.closed ? rod.edges : rod.edges - 1;
   const auto checkJoints = [joints, &rod](const YamlCursor& at, std::size_t count) {
     if (joints > 0 && count != 1 && count != joints)
       at.problem("has " + std::to_string(count) + " entries; must have 1 or " + std::to_string(joints) +
@@ -192,13 +191,13 @@ void checkModuli(const YamlMap& material, const YamlCursor& at_youngs)
     at_youngs.warning("has no effect, since stretch_modulus, bend_modulus and twist_modulus are given; leave it out");
 }
 
-/// Reads the sections of a rod whose frames are published. `edges` is the number of edges of the rod; 0: not known.
-std::vector<SectionFrame> readSectionFrames(const YamlCursor& at, bool closed, int edges)
+/// Reads the sections of a rod whose frames are published.
+std::vector<SectionFrame> readSectionFrames(const YamlCursor& at, const RodConfig& rod)
 {
   std::vector<SectionFrame> frames;
   if (!at.present())
     return frames;
-  const int nodes = (edges > 0 ? edges : max_edges) + (closed ? 0 : 1);
+  const int nodes = rod.edges > 0 ? rod.nodes() : max_edges + (rod.closed ? 0 : 1);
   for (const auto& [name, value] :
        at.members("A section under a name of yours: the index of its node (negative: from the end)."))
   {
@@ -356,7 +355,7 @@ void readTraits(YamlMap& map, RodConfig& rod)
       "rods");
 }
 
-ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
+RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   RodConfig rod;
   YamlMap map(at);
@@ -382,32 +381,31 @@ ReadRod readRod(const YamlCursor& at, const ReadContext& context, const std::str
   map.get("initial_twist", rod.initial_twist, Range::closed(-1e5, 1e5, "rad"),
           "Twist of the whole rod in the shape in which it starts, beyond the rest twist, spread evenly. Without the "
           "key: 0.");
-  const int edges = readCenterline(map, context, rod);
-  readNaturalFrames(map, rod, edges);
-  if (edges > 0 && rod.initial)
+  readCenterline(map, context, rod);
+  readNaturalFrames(map, rod);
+  if (rod.edges > 0 && rod.initial)
     map.find("initial").attempt([&] { initialNodes(rod, restNodes(rod, context.gravity), context.gravity); });
   const YamlCursor at_section =
       map.get("cross_section",
               "Cross-section of the rod: give either `radius` or `ellipse`. Without the key: a radius of 0.005 m.");
-  rod.cross_section = readCrossSection(at_section, edges);
+  rod.cross_section = readCrossSection(at_section, rod.edges);
   readTraits(map, rod);
   warnOfRoundContact(at_section, rod);
   readGrasps(map.get("grasps",
                      "Places where the rod is held, each under a name of its own. Names of grasps differ within a "
                      "scene. Without the key the rod is free."),
-             context, rod, edges);
+             context, rod);
   rod.loads = readRodLoads(
       map.get("loads",
               "Forces and torques that act on the rod all the time, in steps and in statics. Without the key: none."),
-      rod.closed, edges);
-  rod.tracking =
-      readTrackedCurve(map.get("track", "Guide curve whose averages the rod has in every step. Without the key: none."),
-                       context, rod, edges);
+      rod);
+  rod.tracking = readTrackedCurve(
+      map.get("track", "Guide curve whose averages the rod has in every step. Without the key: none."), context, rod);
   rod.broadcast_tf = readSectionFrames(map.get("broadcast_tf",
                                                "Sections whose frames (x along the tangent, y along d1) nodes publish "
                                                "on tf, as NODE/rods/ROD/NAME. Without the key: none."),
-                                       rod.closed, edges);
-  return {std::move(rod), edges};
+                                       rod);
+  return rod;
 }
 
 }   // namespace slender

@@ -242,29 +242,27 @@ ContactConfig readContact(const YamlCursor& at, const SceneConfig& scene)
   return contact;
 }
 
-std::vector<ObstacleConfig> readObstacles(const YamlCursor& at, const ReadContext& context)
+ObstacleConfig readObstacle(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
-  return readEach<ObstacleConfig>(at, 0, 100'000, "obstacle", [&](const YamlCursor& entry, const std::string& name) {
-    ObstacleConfig obstacle;
-    YamlMap map(entry);
-    obstacle.name = name;
-    map.getName(obstacle.name,
-                "Name of the obstacle; bodies and obstacles need different names. Without the key: obstacle if there "
-                "is one obstacle, otherwise obstacle0, obstacle1, ...");
-    const YamlCursor at_pose = map.get("pose",
-                                       "Where the shape is at the start. Without the key: at the origin, not turned. "
-                                       "Not with a table of poses, whose first pose it would contradict.");
-    std::optional<Pose> pose = readPose(at_pose);
-    assign(obstacle.shape, readShape(map.require("shape", "Shape of the obstacle: give one."), context, pose));
-    map.get("friction", obstacle.friction, friction,
-            "Coefficient of friction. Between two objects the geometric mean of both coefficients counts. Without the "
-            "key: that of the other object.");
-    assign(obstacle.motion,
-           readSolidMotion(map.get("motion", "How the obstacle moves. Without the key: it stands."), context, false));
-    startAtTable(obstacle.motion, at_pose.present() ? at_pose : map.at(), "obstacle", pose);
-    assign(obstacle.pose, pose);
-    return obstacle;
-  });
+  ObstacleConfig obstacle;
+  YamlMap map(at);
+  obstacle.name = default_name;
+  map.getName(obstacle.name,
+              "Name of the obstacle; bodies and obstacles need different names. Without the key: obstacle if there "
+              "is one obstacle, otherwise obstacle0, obstacle1, ...");
+  const YamlCursor at_pose = map.get("pose",
+                                     "Where the shape is at the start. Without the key: at the origin, not turned. "
+                                     "Not with a table of poses, whose first pose it would contradict.");
+  std::optional<Pose> pose = readPose(at_pose);
+  assign(obstacle.shape, readShape(map.require("shape", "Shape of the obstacle: give one."), context, pose));
+  map.get("friction", obstacle.friction, friction,
+          "Coefficient of friction. Between two objects the geometric mean of both coefficients counts. Without the "
+          "key: that of the other object.");
+  assign(obstacle.motion,
+         readSolidMotion(map.get("motion", "How the obstacle moves. Without the key: it stands."), context, false));
+  startAtTable(obstacle.motion, at_pose.present() ? at_pose : at, "obstacle", pose);
+  assign(obstacle.pose, pose);
+  return obstacle;
 }
 
 }   // namespace slender

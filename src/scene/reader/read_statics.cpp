@@ -9,7 +9,7 @@ namespace {
 constexpr double most_factor = 1e9;
 const Range factor_range = Range::closed(-most_factor, most_factor);
 
-void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
+void readLoadPlace(YamlMap& map, const RodConfig& rod, RodLoadConfig& load)
 {
   const YamlCursor at =
       map.get("at",
@@ -18,7 +18,7 @@ void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
   const YamlCursor node = map.get("node", "Node on which the load acts. Give either `at` or `node`.");
   if (!map.hasOne({at, node}, "must have either at: start, end or an arc length [m], or node: INDEX"))
     return;
-  const int nodes = edges == 0 ? max_edges + 1 : edges + (closed ? 0 : 1);
+  const int nodes = rod.edges == 0 ? max_edges + 1 : rod.nodes();
   if (node.present())
   {
     if (const auto index = node.integer(-nodes, nodes - 1))
@@ -28,18 +28,18 @@ void readLoadPlace(YamlMap& map, bool closed, int edges, RodLoadConfig& load)
   if (at.isWord("start") || at.isWord("end"))
   {
     load.node = at.isWord("start") ? 0 : nodes - 1;
-    if (closed)
+    if (rod.closed)
       at.problem("is not for a closed rod, which has no ends; give an arc length [m], or node: INDEX");
     return;
   }
   assign(load.arc_length, at.number(Range::closed(0, 1e9, "m, start or end")));
 }
 
-RodLoadConfig readRodLoad(const YamlCursor& at, bool closed, int edges)
+RodLoadConfig readRodLoad(const YamlCursor& at, const RodConfig& rod)
 {
   RodLoadConfig load;
   YamlMap map(at);
-  readLoadPlace(map, closed, edges, load);
+  readLoadPlace(map, rod, load);
   const YamlCursor force = map.get("force", load.force, Range::closed(-1e15, 1e15, "N"),
                                    "Force that keeps its size and its direction in the world. Without the key: none.");
   const YamlCursor torque =
@@ -112,11 +112,11 @@ std::string whyNotAlone(const SceneConfig& scene)
 
 }   // namespace
 
-std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, bool closed, int edges)
+std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, const RodConfig& rod)
 {
   std::vector<RodLoadConfig> loads;
   for (const YamlCursor& item : at.items(1, 10'000))
-    loads.push_back(readRodLoad(item, closed, edges));
+    loads.push_back(readRodLoad(item, rod));
   return loads;
 }
 

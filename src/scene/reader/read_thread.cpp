@@ -234,6 +234,8 @@ void readRegion(const YamlCursor& region, ThreadConfig& thread)
     thread.region = {*a, *b};
 }
 
+}   // namespace
+
 ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const std::string& default_name)
 {
   ThreadConfig thread;
@@ -302,15 +304,6 @@ ThreadConfig readThread(const YamlCursor& at, const ReadContext& context, const 
                                     "Without the key everything is kept.");
   readRegion(region, thread);
   return thread;
-}
-
-}   // namespace
-
-std::vector<ThreadConfig> readThreads(const YamlCursor& at, const ReadContext& context)
-{
-  return readNamed<ThreadConfig>(at, 10'000, "thread", [&](const YamlCursor& entry, const std::string& default_name) {
-    return readThread(entry, context, default_name);
-  });
 }
 
 }   // namespace slender

@@ -222,14 +222,14 @@ TestFunctions readCurveFunctions(const YamlCursor& at, const TrackedCurve& rod, 
 }   // namespace
 
 std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context,
-                                                       const RodConfig& config, int edges)
+                                                       const RodConfig& config)
 {
   if (!at.present())
     return nullptr;
   TrackedCurve rod;
   rod.closed = config.closed;
   rod.shares = Eigen::Vector2d(0, 1);
-  if (edges > 0)
+  if (config.edges > 0)
   {
     try
     {

@@ -385,12 +385,10 @@ void readTrackedCloths(const YamlCursor& at, const ReadContext& context, std::ve
   std::map<std::string, std::string> names;   // to what has it
   for (const ClothConfig& cloth : cloths)
     names.emplace(cloth.name, "a cloth");
-  auto tracked = readNamed<ClothConfig>(
-      at, 1000, "tracked",
-      [&](const YamlCursor& entry, const std::string& default_name) {
-        return readTrackedCloth(entry, context, cloths, default_name);
-      },
-      std::move(names));
+  const auto readOne = [&](const YamlCursor& entry, const ReadContext&, const std::string& default_name) {
+    return readTrackedCloth(entry, context, cloths, default_name);
+  };
+  auto tracked = readNamed(at, 1000, "tracked", context, readOne, std::move(names));
   std::move(tracked.begin(), tracked.end(), std::back_inserter(cloths));
 }
 

@@ -7,10 +7,8 @@
 #include <set>
 #include <sstream>
 
-#include "ignored_keys.h"
 #include "read_parts.h"
-#include "reader_log.h"
-#include "scene_tree.h"
+#include "scene_text.h"
 #include "cloth/cloth_part.h"
 
 namespace slender {
@@ -19,15 +17,8 @@ namespace {
 
 constexpr std::uintmax_t max_file_size = 256u << 20;   // [bytes]
 
-std::vector<ReadRod> readRods(const YamlCursor& at, const ReadContext& context)
-{
-  return readNamed<ReadRod>(at, 100'000, "rod", [&](const YamlCursor& entry, const std::string& default_name) {
-    return readRod(entry, context, default_name);
-  });
-}
-
 /// Adds what the generators made; names must differ from those of the file.
-void takeGeneratedRods(Generated& generated, std::vector<ReadRod>& rods)
+void takeGeneratedRods(Generated& generated, std::vector<RodConfig>& rods)
 {
   std::set<std::string> names, grasps;
   const auto take = [&](std::set<std::string>& used, const std::string& what, const std::string& name,
@@ -39,7 +30,7 @@ void takeGeneratedRods(Generated& generated, std::vector<ReadRod>& rods)
     }
     return true;
   };
-  for (const ReadRod& rod : rods)
+  for (const RodConfig& rod : rods)
   {
     take(names, "rod", rod.name, nullptr);
     for (const GraspConfig& grasp : rod.grasps)
@@ -221,15 +212,15 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
         "is missing; a scene has rods: [{...}], threads: [{...}], cloths: [{...}], tracked: [{...}], generate: [{...}] "
         "or bodies: [{...}]");
   }
-  std::vector<ReadRod> rods = readRods(at_rods, context);
-  Generated generated = readGenerators(at_generate, context, static_cast<int>(rods.size()));
-  takeGeneratedRods(generated, rods);
-  scene.threads = readThreads(at_threads, context);
-  scene.cloths = readCloths(at_cloths, context);
+  scene.rods = readNamed(at_rods, 100'000, "rod", context, readRod);
+  Generated generated = readGenerators(at_generate, context, static_cast<int>(scene.rods.size()));
+  takeGeneratedRods(generated, scene.rods);
+  scene.threads = readNamed(at_threads, 10'000, "thread", context, readThread);
+  scene.cloths = readNamed(at_cloths, 1000, "cloth", context, readCloth);
   readTrackedCloths(at_tracked, context, scene.cloths);
-  scene.obstacles = readObstacles(at_obstacles, context);
+  scene.obstacles = readEach(at_obstacles, 0, 100'000, "obstacle", context, readObstacle);
   auto robots = readRobots(at_robot, context);
-  scene.bodies = readBodies(at_bodies, context, rods);
+  scene.bodies = readBodies(at_bodies, context, scene.rods);
   std::vector<YamlCursor> cloths = entriesOf(at_cloths);
   for (const YamlCursor& entry : entriesOf(at_tracked))
     cloths.push_back(entry);
@@ -258,8 +249,6 @@ void readObjects(YamlMap& map, const ReadContext& context, SceneConfig& scene)
     takeSolid(maker, body.name, true);
     scene.bodies.push_back(std::move(body));
   }
-  for (ReadRod& rod : rods)
-    scene.rods.push_back(std::move(rod));
   chooseContactMethods(cloths, scene);
   scene.contact = readContact(at_contact, scene);
   completeThreads(scene, entriesOf(at_threads));

@@ -6,9 +6,7 @@
 #include <set>
 #include <sstream>
 
-#include "every_key.h"
-#include "reader_log.h"
-#include "slender_sim/scene/reader.h"
+#include "scene_text.h"
 #include "yaml_cursor.h"
 
 namespace slender {
@@ -71,7 +69,7 @@ public:
     constexpr std::ptrdiff_t many = 8;
     for (const SceneKey& key : keys)
     {
-      const std::size_t depth = splitPath(key.path).size();
+      const std::size_t depth = split(key.path, '.').size();
       const bool in_list = key.path.find(".N.") != std::string::npos || key.path.find(".NAME.") != std::string::npos;
       if (depth > 1 && in_list && keysBelow(keys, key.path) >= many &&
           headingOf(key.path).find('.') == std::string::npos)
@@ -180,7 +178,7 @@ bool fits(const std::string& part, const std::string& asked)
 std::string resolved(const std::vector<SceneKey>& keys, const std::string& query)
 {
   std::set<std::string> at = {""};
-  for (const std::string& asked : splitPath(query))
+  for (const std::string& asked : split(query, '.'))
   {
     std::set<std::string> next;
     for (const std::string& path : at)
@@ -257,7 +255,7 @@ std::string describeKeys(const std::vector<SceneKey>& keys, const std::string& q
   const std::string path = resolved(keys, query);
   for (const SceneKey& key : keys)
   {
-    const std::vector<std::string> parts = splitPath(key.path);
+    const std::vector<std::string> parts = split(key.path, '.');
     const bool named = path.empty() ? std::find(parts.begin(), parts.end(), query) != parts.end()
                                     : key.path == path || isBelow(key.path, path);
     // a word that is a section as well as a key elsewhere: both
@@ -272,7 +270,7 @@ std::string nearestKey(const std::vector<SceneKey>& keys, const std::string& que
 {
   std::vector<std::string> words;
   for (const SceneKey& key : keys)
-    for (const std::string& part : splitPath(key.path))
+    for (const std::string& part : split(key.path, '.'))
       if (part != "N" && part != "NAME")
         words.push_back(part);
   return nearestWord(query.substr(query.rfind('.') + 1), words);

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <sstream>
 
-#include "reader_log.h"
+#include "scene_text.h"
 #include "slender_sim/scene/reader.h"
 #include "yaml_cursor.h"
 
@@ -150,9 +150,8 @@ SweepPlan readSweepPlan(const std::string& path)
   SweepPlan plan;
   YamlMap map(YamlCursor(&tree, nullptr, "", problems));
   assign(plan.name, map.require("name", "Name of the sweep.").name());
-  const std::string folder = std::filesystem::path(path).parent_path().string();
   if (const auto scene = map.require("scene", "Path of the scene file.").text())
-    plan.scene = scene->front() == '/' || folder.empty() ? *scene : folder + "/" + *scene;
+    plan.scene = (std::filesystem::path(path).parent_path() / *scene).string();
   const YamlCursor axes =
       map.require("axes", "Values of the scene that are varied: a map from paths to lists of values, or to series.");
   double points = 1;

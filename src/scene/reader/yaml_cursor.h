@@ -11,10 +11,14 @@
 #include <Eigen/Core>
 
 #include "key_log.h"
-#include "yaml_number.h"
+#include "slender_sim/dynamics/failure_place.h"
 #include "yaml_tree.h"
 
 namespace slender {
+
+/// The whole text as a decimal number (1, -2.5, 1e6, +3, also YAML's .inf and .nan), whatever the locale; nothing if it
+/// is not one. Too large to represent gives infinity.
+std::optional<double> parseNumber(const std::string& text);
 
 /// Allowed values of a number, written as mathematicians do: (0, 10] m.
 struct Range

@@ -209,7 +209,7 @@ std::optional<double> placeIn(const YamlTree& list, const std::string& part)
 void requireKnownGrasp(const YamlTree& map, const std::string& path, const std::string& name, std::size_t parts,
                        const std::string& where)
 {
-  const std::vector<std::string> passed = splitPath(path);
+  const std::vector<std::string> passed = split(path, '.');
   if (passed.back() != "grasps" || parts == passed.size() + 1)
     return;
   std::vector<std::string> names;
@@ -240,11 +240,11 @@ YamlTree* YamlTree::find(const std::string& key)
   return const_cast<YamlTree*>(static_cast<const YamlTree*>(this)->find(key));
 }
 
-std::vector<std::string> splitPath(const std::string& path)
+std::vector<std::string> split(const std::string& text, char separator)
 {
   std::vector<std::string> parts(1);
-  for (char c : path)
-    if (c == '.')
+  for (char c : text)
+    if (c == separator)
       parts.emplace_back();
     else
       parts.back() += c;
@@ -292,7 +292,7 @@ void applyOverride(YamlTree& root, const std::string& assignment, const std::str
 
   YamlTree* at = &root;
   std::string passed;
-  const std::vector<std::string> parts = splitPath(assignment.substr(0, equals));
+  const std::vector<std::string> parts = split(assignment.substr(0, equals), '.');
   for (const std::string& part : parts)
   {
     const std::string here = passed.empty() ? "the scene" : "'" + passed + "'";

@@ -48,8 +48,8 @@ YamlTree parseYaml(const std::string& text, const std::string& file);
 /// The document written out again (what nodes publish after overrides).
 std::string writeYaml(const YamlTree& tree);
 
-/// The parts of a path between its dots; at least one.
-std::vector<std::string> splitPath(const std::string& path);
+/// The parts of a text between its separators; at least one.
+std::vector<std::string> split(const std::string& text, char separator);
 
 /// Applies "path.to.value=YAML". Missing keys are created. An entry of a list is given by its index (negative: from the
 /// end), or by its name if it has a key `name`. Throws SceneError with the part of the path that does not fit. `source`

@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "earlier_run.h"
 #include "slender_sim/scene/statics_run.h"
 #include "text_file.h"
 

@@ -9,18 +9,6 @@
 
 namespace slender {
 
-const std::vector<std::pair<std::string, RecordField>>& recordFieldNames()
-{
-  static const std::vector<std::pair<std::string, RecordField>> names = {{"curvature", RecordField::curvature},
-                                                                         {"twist", RecordField::twist},
-                                                                         {"strain", RecordField::strain},
-                                                                         {"force", RecordField::force},
-                                                                         {"moment", RecordField::moment},
-                                                                         {"energy", RecordField::energy},
-                                                                         {"contact_force", RecordField::contact_force}};
-  return names;
-}
-
 namespace {
 
 constexpr double empty_cell = std::numeric_limits<double>::quiet_NaN();

@@ -9,8 +9,6 @@
 #include "slender_sim/geometry/mesh_file.h"
 #include "slender_sim/scene/csv_tables.h"
 #include "slender_sim/scene/file_paths.h"
-#include "earlier_run.h"
-#include "text_file.h"
 
 namespace slender {
 

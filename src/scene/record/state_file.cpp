@@ -13,8 +13,7 @@
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/simulation.h"
 #include "slender_sim/scene/state_bytes.h"
-#include "state_fingerprint.h"
-#include "state_fit.h"
+#include "state_file.h"
 
 /// Saving and loading of a simulation's state. The file: magic, version, fingerprint of the scene, size and checksum of
 /// the payload, payload; numbers as this machine keeps them (the magic number tells the byte order).

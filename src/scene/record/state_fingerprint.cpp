@@ -1,6 +1,5 @@
-#include "state_fingerprint.h"
-
 #include "byte_archive.h"
+#include "state_file.h"
 
 namespace slender {
 

@@ -1,5 +1,4 @@
 // Tables of the equilibria that statics found.
-#include "earlier_run.h"
 #include "slender_sim/scene/statics_run.h"
 #include "text_file.h"
 

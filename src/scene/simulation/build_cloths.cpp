@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/reader/yaml_number.h"
 #include "cloth_grasps.h"
 #include "scene_parts.h"
 #include "slender_sim/energy/plate_bending.h"

@@ -1,10 +1,9 @@
-#include "slender_sim/scene/failure_surroundings.h"
+#include "failure_text.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "scene/reader/yaml_number.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/contact/solids.h"
 

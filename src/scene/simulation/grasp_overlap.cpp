@@ -1,9 +1,8 @@
-#include "slender_sim/scene/grasp_overlap.h"
+#include "failure_text.h"
 
 #include <algorithm>
 #include <vector>
 
-#include "scene/reader/yaml_number.h"
 #include "slender_sim/contact/distance.h"
 #include "slender_sim/geometry/pose_motion.h"
 

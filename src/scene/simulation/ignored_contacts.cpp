@@ -1,9 +1,8 @@
-#include "ignored_contacts.h"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "scene_parts.h"
 #include "slender_sim/contact/solids.h"
 
 namespace slender {

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <set>
 
-#include "scene/reader/yaml_number.h"
-
 namespace slender {
 
 namespace {

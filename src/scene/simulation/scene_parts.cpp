@@ -1,7 +1,5 @@
 #include "scene_parts.h"
 
-#include "ignored_contacts.h"
-
 namespace slender {
 
 SceneParts buildParts(SceneConfig& scene)

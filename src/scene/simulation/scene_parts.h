@@ -29,6 +29,11 @@ void buildCloths(SceneConfig& scene, SceneParts& parts);
 /// Bodies and obstacles.
 void buildBodies(const SceneConfig& scene, SceneParts& parts);
 
+/// Sets in the model which obstacles the objects of the scene pass through. These are the obstacles in `contact.ignore`
+/// of a grasp, and, near a grasp, the links of a robot that its held part touches at the start. Adds a sentence for
+/// each of them to the notes of the configuration. Call it after all parts and obstacles were built.
+void ignoreHeldContacts(SceneConfig& scene, SceneParts& parts);
+
 /// Where a part is in the scene's file, for messages; kind none: the file.
 std::string placeOf(const SceneConfig& scene, FailurePlace::Kind kind, int index);
 

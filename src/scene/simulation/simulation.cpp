@@ -2,14 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
-#include "scene/reader/yaml_number.h"
+#include "failure_text.h"
 #include "scene_inputs.h"
 #include "scene_parts.h"
-#include "slender_sim/scene/failure_surroundings.h"
-#include "slender_sim/scene/grasp_overlap.h"
 #include "slender_sim/scene/reader.h"
 #include "slender_sim/scene/scene_edit.h"
 #include "state_transfer.h"

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "scene/reader/yaml_number.h"
-#include "scene/record/state_fit.h"
+#include "scene/record/state_file.h"
 #include "cloth_grasps.h"
 #include "slender_sim/scene/reader.h"
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "scene/reader/yaml_number.h"
 #include "scene_parts.h"
 #include "slender_sim/rod/rod_path.h"
 #include "slender_sim/scene/reader.h"

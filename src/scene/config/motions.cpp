@@ -1,4 +1,4 @@
-#include "slender_sim/scene/tracking_config.h"
+#include "slender_sim/scene/config.h"
 
 namespace slender {
 
@@ -43,6 +43,14 @@ void GuideConfig::evaluate(double time, Eigen::Matrix3Xd& vertices, Eigen::Matri
   carried->binding.place(poses, vertices);
   if (velocities)
     carried->binding.velocities(poses, twists, *velocities);
+}
+
+std::optional<Pose> offsetInFrame(const GraspConfig& grasp)
+{
+  if (grasp.offset || grasp.attach == Attach::initial)
+    return grasp.offset;
+  const auto* tf = std::get_if<TfMotion>(&grasp.motion);
+  return tf ? std::optional<Pose>(tf->offset) : std::nullopt;
 }
 
 }   // namespace slender
