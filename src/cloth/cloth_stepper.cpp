@@ -17,11 +17,7 @@ Island& ClothStepper::Impl::island()
   std::unique_ptr<Island>& island = undivided ? undivided_ : island_;
   if (!island)
   {
-    TimeConfig time;
-    time.integrator = options.integrator;
-    time.error_tolerance = options.error_tolerance;
-    time.min_step = options.min_step;
-    time.newton = options.newton;
+    TimeConfig time = options;
     time.newton.one_step = options.one_newton_step;
     island = std::make_unique<Island>(time, false);
     island->equations().tolerances.most_unbalanced = kUnbalanced;

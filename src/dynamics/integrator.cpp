@@ -12,17 +12,9 @@ long stepsUntil(double end, double step)
 
 const char* toString(Integrator integrator)
 {
-  switch (integrator)
-  {
-    case Integrator::implicit_euler: return "implicit_euler";
-    case Integrator::bdf2: return "bdf2";
-    case Integrator::tr_bdf2: return "tr_bdf2";
-    case Integrator::implicit_midpoint: return "implicit_midpoint";
-    case Integrator::generalized_alpha: return "generalized_alpha";
-    case Integrator::symplectic_euler: return "symplectic_euler";
-    case Integrator::imex: return "imex";
-  }
-  return "unknown";
+  static const char* const words[] = {"implicit_euler",   "bdf2", "tr_bdf2", "implicit_midpoint", "generalized_alpha",
+                                      "symplectic_euler", "imex"};
+  return words[static_cast<int>(integrator)];
 }
 
 namespace {

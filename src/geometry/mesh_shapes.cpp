@@ -155,14 +155,8 @@ TriangleMesh irregular(double width, double height, int columns, int rows, unsig
 
 const char* toString(GridPattern pattern)
 {
-  switch (pattern)
-  {
-    case GridPattern::one_diagonal: return "one_diagonal";
-    case GridPattern::alternating: return "alternating";
-    case GridPattern::equilateral: return "equilateral";
-    case GridPattern::irregular: return "irregular";
-  }
-  return "unknown";
+  static const char* const words[] = {"one_diagonal", "alternating", "equilateral", "irregular"};
+  return words[static_cast<int>(pattern)];
 }
 
 TriangleMesh gridMesh(double width, double height, int columns, int rows, GridPattern pattern, unsigned seed)

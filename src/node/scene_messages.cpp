@@ -90,10 +90,8 @@ void SceneMessages::fillThreads(const Simulation& simulation)
       message.name = simulation.threadModel(static_cast<int>(k)).name;
       appendPoses(thread, poses.poses);
     }
-    const EndLoad& load = simulation.state().end_loads[static_cast<int>(k)][1];
     nozzles[k].header = header;
-    nozzles[k].wrench.force = toVector3(load.force);
-    nozzles[k].wrench.torque = toVector3(load.torque);
+    nozzles[k].wrench = toMessage(scene.end_loads[k][1]);
   }
   threads.resize(piece);
 }

@@ -81,7 +81,7 @@ StepReport ThreadStepper::step(ThreadState& state, const ThreadInputs& inputs, d
     std::swap(state, alone_->work);
   return report;
 }
-const std::array<EndLoad, 2>& ThreadStepper::endLoads() const { return alone_->loads; }
+const std::array<Wrench, 2>& ThreadStepper::endLoads() const { return alone_->loads; }
 const ThreadModel& ThreadStepper::model() const { return *alone_->model; }
 
 bool ThreadWork::inputsFinite(const ThreadState& s, const ThreadInputs& inputs, double duration,

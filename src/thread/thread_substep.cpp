@@ -330,13 +330,13 @@ void ThreadWork::finish()
     push();
 }
 
-EndLoad ThreadWork::endLoad(int end) const
+Wrench ThreadWork::endLoad(int end) const
 {
   const int node = end ? lastInSystem() : 1, inside = end ? node + 1 : 0, edge = end ? node : 0;
   const Eigen::Vector3d at = system.nodeGradient(node), beyond = system.nodeGradient(inside);
   const Eigen::Vector3d arm = system.position(inside) - system.position(node);
   const Eigen::Vector3d tangent = (end ? -1.0 : 1.0) * (end_poses[end].orientation * Eigen::Vector3d::UnitX());
-  EndLoad load;
+  Wrench load;
   load.force = -(at + beyond);
   load.torque = -arm.cross(beyond) - system.angleGradient(edge) * tangent;
   return load;

@@ -80,7 +80,7 @@ public:
   std::shared_ptr<const ThreadModel> model;
   NewtonConfig newton;
   bool explicit_step;
-  std::array<EndLoad, 2> loads;
+  std::array<Wrench, 2> loads;
   const ThreadInputs* inputs = nullptr;   ///< of the step
   double duration = 1.0;                  ///< of the step [s]
   Substep substep;
@@ -96,7 +96,7 @@ private:
   bool meetsFloor(int node, double& when) const;
   void restBetweenLying();
   void split(int j, double fraction, const RemeshGuard* guard);
-  EndLoad endLoad(int end) const;
+  Wrench endLoad(int end) const;
   double flowSpeed(const ThreadInputs& step_inputs) const
   {
     return step_inputs.flow_rate > 0 ? step_inputs.flow_rate / model->nozzleArea() : 0.0;

@@ -95,7 +95,7 @@ void ThreadObject::addParts(std::vector<Part*>& parts)
 
 void ThreadObject::finish(WorldState& state)
 {
-  std::array<EndLoad, 2>& loads = state.end_loads[index];
+  std::array<Wrench, 2>& loads = state.end_loads[index];
   loads = {};
   const std::uint64_t before = nextId(work_.threads);
   for (std::size_t s = 0; s < work_.threads.size(); ++s)

@@ -139,7 +139,7 @@ ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eig
 
 ContactLoads World::contactLoads() const
 {
-  ContactLoads all{{}, std::vector<SolidLoad>(model().obstacles.size()), std::vector<SolidLoad>(model().bodies.size())};
+  ContactLoads all{{}, std::vector<Wrench>(model().obstacles.size()), std::vector<Wrench>(model().bodies.size())};
   for (const auto& scheduler : impl_->schedulers)
     scheduler->addContacts(all);
   return all;

@@ -41,18 +41,9 @@ enum class ClothSolver
   gauss_seidel   ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
 };
 
-/// How a cloth is advanced.
-///  - implicit_euler: first order; damps what the step does not resolve.
-///  - tr_bdf2: second order, likewise damping; two stages, each at about the price of a step of implicit Euler.
-///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and
-///    the wind explicit (thesis 2.5.2). The matrix is constant, n x n, and factored once, so that a step costs one
-///    back-solve. Bending never limits the step, the membrane does as in explicit steps: h < 2 / omega, omega^2 the
-///    largest eigenvalue of M^-1 K of the membrane, about 0.5 edge sqrt(area density / modulus) [s]. Isometric bending
-///    (or none) only.
-///  - symplectic_euler: first order, explicit; bending limits the step as well.
-struct ClothOptions
+/// How the equations of a cloth are solved.
+struct ClothSolving
 {
-  Integrator integrator = Integrator::implicit_euler;   ///< one of the above
   bool one_newton_step = false;   ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
   ClothSolver solver = ClothSolver::automatic;
   /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of
@@ -62,10 +53,22 @@ struct ClothOptions
   /// norm, before the averages are met: positions are as good as those of the same cloth without averages, averages
   /// exact, their forces often less so than by conjugate_gradients.
   double linear_tolerance = 5e-3;
-  /// [m] local error per substep, implicit_euler and tr_bdf2 only; 0: fixed steps
-  double error_tolerance = 0.0;
-  double min_step = 1e-7;   ///< [s] adaptive steps never get shorter
-  NewtonConfig newton;
+};
+
+/// How a cloth is advanced. Of the integrators:
+///  - implicit_euler: first order; damps what the step does not resolve.
+///  - tr_bdf2: second order, likewise damping; two stages, each at about the price of a step of implicit Euler.
+///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and
+///    the wind explicit (thesis 2.5.2). The matrix is constant, n x n, and factored once, so that a step costs one
+///    back-solve. Bending never limits the step, the membrane does as in explicit steps: h < 2 / omega, omega^2 the
+///    largest eigenvalue of M^-1 K of the membrane, about 0.5 edge sqrt(area density / modulus) [s]. Isometric bending
+///    (or none) only.
+///  - symplectic_euler: first order, explicit; bending limits the step as well.
+///
+/// Local errors are controlled with implicit_euler and tr_bdf2 only.
+struct ClothOptions : TimeConfig, ClothSolving
+{
+  ClothOptions() { integrator = Integrator::implicit_euler; }
 };
 
 /// Advances one cloth.

@@ -29,4 +29,18 @@ struct Twist
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();   ///< [rad/s]
 };
 
+/// Force and torque, in world axes. What exerts them on what, and about which point, is said where a wrench is given.
+struct Wrench
+{
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< [N]
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
+
+  /// Adds a force that acts at a point, seen from the point about which the torque is.
+  void add(const Eigen::Vector3d& more, const Eigen::Vector3d& at)
+  {
+    force += more;
+    torque += at.cross(more);
+  }
+};
+
 }   // namespace slender

@@ -25,13 +25,6 @@ struct RodInputs
   Eigen::VectorXd torques;
 };
 
-/// Force and torque that the rod exerts on the gripper, about the grasp origin, in world axes.
-struct Wrench
-{
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< [N]
-  Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
-};
-
 struct RodEnergies
 {
   double stretch = 0, bend = 0, twist = 0, kinetic = 0, gravity = 0;   ///< [J]

@@ -23,6 +23,7 @@
 #include "slender_sim/scene/limits_config.h"
 #include "slender_sim/scene/statics_config.h"
 #include "slender_sim/scene/tracking_config.h"
+#include "slender_sim/thread/thread_model.h"
 
 /// Plain structs: a scene as checked by the reader (scene/reader.h). SI units.
 namespace slender {
@@ -283,12 +284,9 @@ struct FloorConfig
 };
 
 /// A thread that leaves a nozzle, or one that is there from the start: one of `nozzle` and `centerline`.
-struct ThreadConfig
+struct ThreadConfig : Fluid
 {
   std::string name;
-  double density = 1000.0;        ///< [kg/m^3]
-  double viscosity = 1.0;         ///< dynamic [Pa s]
-  double surface_tension = 0.0;   ///< [N/m]
   std::optional<NozzleConfig> nozzle;
   std::optional<Curve> centerline;          ///< from its oldest to its newest end
   std::vector<double> radius;               ///< of its edges [m]: one, two (a taper) or one per edge
@@ -329,7 +327,7 @@ struct ClothGrid
 
 /// A grasp's frame has its origin at the mean of the held vertices and the world's axes when it takes hold; then it
 /// moves with its motion, and the vertices rigidly with it.
-struct ClothConfig : ClothProperties
+struct ClothConfig : ClothProperties, ClothSolving
 {
   std::string name;
   std::string place;                 ///< "FILE:LINE: PATH" for messages; empty when not read from a file
@@ -338,9 +336,6 @@ struct ClothConfig : ClothProperties
   Eigen::Matrix3Xd start_velocity;   ///< of the vertices [m/s]; empty: at rest
   std::optional<ClothGrid> grid;     ///< that the mesh was made from
   double area_density = 0.15;        ///< [kg/m^2]
-  ClothSolver solver = ClothSolver::automatic;
-  bool one_newton_step = false;
-  double linear_tolerance = 5e-3;
   std::vector<GraspConfig> grasps;
   std::vector<ClothLoadConfig> loads;               ///< dead loads on vertices, in statics and in dynamics
   std::shared_ptr<const TrackingConfig> tracking;   ///< what it follows (`tracked`); null: nothing

@@ -42,13 +42,17 @@ struct ThreadLimits
                             Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity())};
 };
 
-/// Fixed properties of one viscous thread (thesis 5).
-struct ThreadModel
+struct Fluid
 {
-  std::string name;
   double density = 1000.0;        ///< [kg/m^3]
   double viscosity = 1.0;         ///< dynamic, mu [Pa s]
   double surface_tension = 0.0;   ///< gamma [N/m]
+};
+
+/// Fixed properties of one viscous thread (thesis 5).
+struct ThreadModel : Fluid
+{
+  std::string name;
   SurfaceShape surface_shape = SurfaceShape::cone;
   double nozzle_diameter = 0.0;   ///< [m]; 0: no nozzle
   double feed_length = 0.0;       ///< [m] of the edges that leave the nozzle

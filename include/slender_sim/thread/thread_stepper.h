@@ -19,13 +19,6 @@ struct ThreadInputs
   Eigen::Vector3d belt_velocity = Eigen::Vector3d::Zero();   ///< [m/s] of the floor; what has landed moves with it
 };
 
-/// What the thread exerts on the holder of an end, about the end node, in world axes.
-struct EndLoad
-{
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< [N]
-  Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
-};
-
 /// Advances one viscous thread (thesis 5.3): the rod's energies with viscous stiffnesses, their rest strains those at
 /// the start of the step. implicit_euler for use; symplectic_euler, stable only for steps of about rho l^2 / (6 mu) at
 /// the shortest edge l, for comparison.
@@ -43,7 +36,7 @@ public:
   StepReport step(ThreadState& state, const ThreadInputs& inputs, double duration);
 
   /// At the end of the last successful step; zero for a free end.
-  const std::array<EndLoad, 2>& endLoads() const;
+  const std::array<Wrench, 2>& endLoads() const;
 
   const ThreadModel& model() const;
 

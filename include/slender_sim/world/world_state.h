@@ -77,22 +77,11 @@ struct ContactForce
   Eigen::Vector3d force;      ///< on what touches, a solid excepted [N]
 };
 
-/// Sum of the forces of contact on a solid, and their torque about the world's origin.
-struct SolidLoad
-{
-  Eigen::Vector3d force{0, 0, 0}, torque{0, 0, 0};   ///< [N], [N m]
-  void add(const Eigen::Vector3d& more, const Eigen::Vector3d& at)
-  {
-    force += more;
-    torque += at.cross(more);
-  }
-};
-
-/// Contacts by the barrier, and their loads on all obstacles and bodies.
+/// Contacts by the barrier, and their sums on all obstacles and bodies, with torques about the world's origin.
 struct ContactLoads
 {
   std::vector<ContactForce> contacts;
-  std::vector<SolidLoad> obstacles, bodies;
+  std::vector<Wrench> obstacles, bodies;
 };
 
 /// Everything that changes while a world moves; saving and restoring it restarts bit-equal.
@@ -109,7 +98,7 @@ struct WorldState
   std::vector<Pose> obstacles;
   std::vector<Twist> obstacle_velocities;
   ContactMemories contact;
-  std::vector<std::array<EndLoad, 2>> end_loads;   ///< per thread, of the last step
+  std::vector<std::array<Wrench, 2>> end_loads;   ///< per thread, of the last step
 };
 
 /// Inputs of one step, latched before it. All lists are as long as those of the model, except where something else is

@@ -91,11 +91,7 @@ std::optional<ClothGrid> readClothGrid(const YamlCursor& at, const ReadContext& 
       at_cells.problem("makes more than " + std::to_string(max_cells) + " rows; give [columns, rows]");
   }
   GridPattern pattern = GridPattern::equilateral;
-  map.get("pattern", pattern,
-          {{"one_diagonal", GridPattern::one_diagonal},
-           {"alternating", GridPattern::alternating},
-           {"equilateral", GridPattern::equilateral},
-           {"irregular", GridPattern::irregular}},
+  map.get("pattern", pattern, allUpTo(GridPattern::irregular),
           "How the rectangle is divided into triangles; bending depends on the pattern. Vertices are numbered from the "
           "corner along the first side, row after row. Without the key: equilateral.");
   if (at_seed.present() && pattern != GridPattern::irregular)

@@ -12,14 +12,7 @@ TimeConfig readTime(const YamlCursor& at)
   map.get("step", time.step, Range::above(0, 10, "s"), "Length of a time step. Without the key: 0.005 s.");
   map.get("duration", time.duration, Range::above(0, 1e7, "s"),
           "Simulated time after which `simulate` ends; nodes run on. Without the key: 10 s.");
-  map.get("integrator", time.integrator,
-          {{"implicit_euler", Integrator::implicit_euler},
-           {"bdf2", Integrator::bdf2},
-           {"tr_bdf2", Integrator::tr_bdf2},
-           {"implicit_midpoint", Integrator::implicit_midpoint},
-           {"generalized_alpha", Integrator::generalized_alpha},
-           {"symplectic_euler", Integrator::symplectic_euler},
-           {"imex", Integrator::imex}},
+  map.get("integrator", time.integrator, allUpTo(Integrator::imex),
           "Method by which time steps are taken. Without the key: tr_bdf2; implicit_euler in scenes with cloth, with "
           "contact of rods or bodies, and with rods that have `track`. Threads always take implicit_euler; imex is for "
           "cloth alone, and symplectic_euler takes explicit steps.");

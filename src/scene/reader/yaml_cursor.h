@@ -51,6 +51,16 @@ void assign(Target& target, const std::optional<Value>& value)
 template <class Value>
 using Choices = std::vector<std::pair<std::string, Value>>;
 
+/// All values of an enumeration up to its last one, with the words of toString().
+template <class Value>
+Choices<Value> allUpTo(Value last)
+{
+  Choices<Value> choices;
+  for (int k = 0; k <= static_cast<int>(last); ++k)
+    choices.emplace_back(toString(static_cast<Value>(k)), static_cast<Value>(k));
+  return choices;
+}
+
 /// Everything wrong with one scene, in the order found.
 class Problems
 {

@@ -98,7 +98,7 @@ void addSolids(const Simulation& simulation, std::vector<FieldTable>& out)
   const bool known = std::none_of(scene.cloths.begin(), scene.cloths.end(), [](const ClothConfig& cloth) {
     return cloth.contact && cloth.contact->solids && cloth.contact->method == ContactMethod::impulses;
   });
-  const auto add = [&](const std::string& name, const SolidLoad& load, const Eigen::Vector3d& origin) {
+  const auto add = [&](const std::string& name, const Wrench& load, const Eigen::Vector3d& origin) {
     Eigen::MatrixXd values(6, 1);
     values << load.force, load.torque - origin.cross(load.force);
     if (!known)

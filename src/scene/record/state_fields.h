@@ -25,7 +25,6 @@ struct Members
 auto fieldsOf(const Pose&) -> Members<&Pose::position, &Pose::orientation>;
 auto fieldsOf(const Twist&) -> Members<&Twist::linear, &Twist::angular>;
 auto fieldsOf(const Wrench&) -> Members<&Wrench::force, &Wrench::torque>;
-auto fieldsOf(const EndLoad&) -> Members<&EndLoad::force, &EndLoad::torque>;
 auto fieldsOf(const GraspState&)
     -> Members<&GraspState::active, &GraspState::first_node, &GraspState::last_node, &GraspState::holds_frame,
                &GraspState::body, &GraspState::X_WG, &GraspState::velocity, &GraspState::nodes_G,

@@ -60,25 +60,13 @@ ClothModel modelOf(const ClothConfig& config, std::vector<std::string>& warnings
   return model;
 }
 
-ClothOptions optionsOf(const ClothConfig& config, const TimeConfig& time)
-{
-  ClothOptions options;
-  options.integrator = time.integrator;
-  options.one_newton_step = config.one_newton_step;
-  options.solver = config.solver;
-  options.linear_tolerance = config.linear_tolerance;
-  options.newton = time.newton;
-  options.error_tolerance = time.error_tolerance;
-  options.min_step = time.min_step;
-  return options;
-}
-
 void addCloth(SceneConfig& scene, int k, SceneParts& parts)
 {
   const ClothConfig& config = scene.cloths[k];
   WorldModel::Cloth cloth;
   cloth.model = std::make_shared<const ClothModel>(modelOf(config, scene.warnings));
-  cloth.options = optionsOf(config, scene.time);
+  static_cast<TimeConfig&>(cloth.options) = scene.time;
+  static_cast<ClothSolving&>(cloth.options) = config;
   cloth.contact = config.contact;
   ClothState state = makeClothState(*cloth.model, config.start.cols() ? config.start : config.mesh.vertices);
   if (config.start_velocity.cols())

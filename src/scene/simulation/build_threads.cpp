@@ -15,9 +15,7 @@ ThreadModel modelOf(const ThreadConfig& config)
 {
   ThreadModel model;
   model.name = config.name;
-  model.density = config.density;
-  model.viscosity = config.viscosity;
-  model.surface_tension = config.surface_tension;
+  static_cast<Fluid&>(model) = config;
   if (config.nozzle)
   {
     model.nozzle_diameter = config.nozzle->diameter;

@@ -55,7 +55,7 @@ struct Method
   Integrator integrator;
   bool one_step;
   ClothSolver solver;
-  double linear_tolerance = ClothOptions{}.linear_tolerance;
+  double linear_tolerance = ClothSolving{}.linear_tolerance;
 };
 
 constexpr Method kMethods[] = {
