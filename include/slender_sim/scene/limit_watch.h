@@ -72,15 +72,14 @@ private:
   void act(Excursion& excursion);
   void holdInputs(SceneInputs& inputs) const;
   void checkStrains(std::vector<LimitExcess>& begun);
-  void checkRodStrain(int rod, std::vector<LimitExcess>& begun);
-  void checkClothStrain(int cloth, std::vector<LimitExcess>& begun);
+  template <class Stretch, class Name>
+  void checkStrain(const Key& key, double limit, int edges, const Stretch& stretch, const Name& name,
+                   const std::pair<int, int>& held, std::vector<LimitExcess>& begun);
   std::vector<int> mostLoaded(int rod, int cloth) const;
 
   Simulation& simulation_;
   const LimitsConfig limits_;
-  /// per cloth: the edges of its mesh, and the rest lengths of these edges [m]
-  std::vector<std::vector<std::pair<int, int>>> cloth_edges_;
-  std::vector<std::vector<double>> cloth_lengths_;
+  std::vector<std::vector<double>> cloth_lengths_;   ///< per cloth: rest lengths of the edges of its mesh [m]
   std::vector<double> rod_strain_limits_;
   double cloth_strain_limit_ = kSoftStrain;
   std::map<Key, Excursion> excursions_;

@@ -22,30 +22,38 @@ struct Branch
   Eigen::Vector3d root{0, 0, 0}, direction{0, 0, 1};
 };
 
-struct TreeShape
+/// What the scene says of a tree.
+struct Tree
 {
+  std::string name = "tree";
   int vertices = 2158, levels = 3, children = 7;
   double length = 3.0, radius = 0.05, length_ratio = 0.5, radius_ratio = 0.45, incline = 0.9;
+  double taper = 0.4, joint_density = 0.0;
+  Eigen::Vector3d root{0, 0, 0}, up;
+  RodConfig rod;   ///< of which each branch is a copy
+  Motion motion;
 };
 
-std::vector<Branch> grow(const TreeShape& shape, Dice& dice)
+std::vector<Branch> grow(const Tree& tree, Dice& dice)
 {
   std::vector<Branch> branches(1);
-  branches[0].length = shape.length;
-  branches[0].radius = shape.radius;
+  branches[0].length = tree.length;
+  branches[0].radius = tree.radius;
+  branches[0].root = tree.root;
+  branches[0].direction = tree.up;
   for (std::size_t b = 0; b < branches.size(); ++b)
   {
     const Branch parent = branches[b];
-    for (int c = 0; parent.level + 1 < shape.levels && c < shape.children; ++c)
+    for (int c = 0; parent.level + 1 < tree.levels && c < tree.children; ++c)
     {
       Branch child;
       child.parent = static_cast<int>(b);
       child.level = parent.level + 1;
-      child.at = 0.3 + 0.65 * (c + dice.between(0.25, 0.75)) / shape.children;
+      child.at = 0.3 + 0.65 * (c + dice.between(0.25, 0.75)) / tree.children;
       child.azimuth = kGoldenAngle * c + dice.between(-0.4, 0.4);
-      child.incline = shape.incline * dice.between(0.8, 1.2);
-      child.length = parent.length * shape.length_ratio * (1.2 - 0.5 * child.at) * dice.between(0.9, 1.1);
-      child.radius = parent.radius * shape.radius_ratio;
+      child.incline = tree.incline * dice.between(0.8, 1.2);
+      child.length = parent.length * tree.length_ratio * (1.2 - 0.5 * child.at) * dice.between(0.9, 1.1);
+      child.radius = parent.radius * tree.radius_ratio;
       branches.push_back(child);
     }
   }
@@ -72,36 +80,23 @@ void shareNodes(std::vector<Branch>& branches, int vertices)
     ++branches[rests[static_cast<std::size_t>(k)].second].nodes;
 }
 
-/// What the scene says of a tree.
-struct Tree
-{
-  std::string name = "tree";
-  TreeShape shape;
-  double taper = 0.4, joint_density = 0.0;
-  Eigen::Vector3d root{0, 0, 0}, up;
-  RodConfig rod;   ///< of which each branch is a copy
-  Motion motion;
-};
-
 Tree readTree(YamlMap& map, const ReadContext& context)
 {
   Tree tree;
   map.getName(tree.name, "Name of the tree; its branches are NAME_0 (the trunk), NAME_1, ... Without the key: tree.");
-  TreeShape& shape = tree.shape;
-  map.get("vertices", shape.vertices, Range::closed(least_nodes, max_edges),
+  map.get("vertices", tree.vertices, Range::closed(least_nodes, max_edges),
           "Number of nodes of all branches together. Without the key: 2158.");
-  map.get("levels", shape.levels, Range::closed(1, 6), "Number of levels: 1 is a trunk alone. Without the key: 3.");
-  map.get("children", shape.children, Range::closed(1, 30),
+  map.get("levels", tree.levels, Range::closed(1, 6), "Number of levels: 1 is a trunk alone. Without the key: 3.");
+  map.get("children", tree.children, Range::closed(1, 30),
           "Number of side branches of each branch. Without the key: 7.");
-  map.get("length", shape.length, kLength, "Length of the trunk. Without the key: 3 m.");
-  map.get("radius", shape.radius, Range::above(0, 10, "m"),
-          "Radius of the trunk at its root. Without the key: 0.05 m.");
+  map.get("length", tree.length, kLength, "Length of the trunk. Without the key: 3 m.");
+  map.get("radius", tree.radius, Range::above(0, 10, "m"), "Radius of the trunk at its root. Without the key: 0.05 m.");
   const Range ratio = Range::above(0, 1);
-  map.get("length_ratio", shape.length_ratio, ratio,
+  map.get("length_ratio", tree.length_ratio, ratio,
           "Length of a side branch over that of its parent, about. Without the key: 0.5.");
-  map.get("radius_ratio", shape.radius_ratio, ratio,
+  map.get("radius_ratio", tree.radius_ratio, ratio,
           "Radius of a side branch over that of its parent. Without the key: 0.45.");
-  map.get("angle", shape.incline, Range::between(0, 0.5 * M_PI, "rad"),
+  map.get("angle", tree.incline, Range::between(0, 0.5 * M_PI, "rad"),
           "Angle between a side branch and its parent, about. Without the key: 0.9 rad.");
   map.get("taper", tree.taper, ratio, "Radius of a branch at its tip over that at its root. Without the key: 0.4.");
   map.get("root", tree.root, kCoordinate, "Position of the root. Without the key: [0, 0, 0].");
@@ -149,7 +144,6 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
 {
   YamlMap map(at);
   Tree tree = readTree(map, context);
-  const TreeShape& shape = tree.shape;
   const YamlCursor at_vertices = map.find("vertices");
   int seed = 1;
   map.get("seed", seed, Range::closed(0, 1'000'000'000),
@@ -159,22 +153,20 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
     return;
   Dice dice(seed);
   long count = 0, of_level = 1;
-  for (int level = 0; level < shape.levels; ++level, of_level *= shape.children)
+  for (int level = 0; level < tree.levels; ++level, of_level *= tree.children)
     count += of_level;
   const YamlCursor& place = at_vertices.present() ? at_vertices : at;
-  if (shape.vertices < least_nodes * count)   // before they grow: 6 levels of 30 children are 750 million
+  if (tree.vertices < least_nodes * count)   // before they grow: 6 levels of 30 children are 750 million
   {
     place.problem("is too few for " + std::to_string(count) + " branches; must be at least " +
                   std::to_string(least_nodes * count));
     return;
   }
-  if (!context.claim(place, shape.vertices))
+  if (!context.claim(place, tree.vertices))
     return;
-  std::vector<Branch> branches = grow(shape, dice);
-  shareNodes(branches, shape.vertices);
+  std::vector<Branch> branches = grow(tree, dice);
+  shareNodes(branches, tree.vertices);
 
-  branches[0].root = tree.root;
-  branches[0].direction = tree.up;
   std::vector<std::vector<Eigen::Vector3d>> points(branches.size());
   std::vector<int> last_joint(branches.size(), -1);   // edge of the branch that carries its last ball so far
   for (std::size_t b = 0; b < branches.size(); ++b)
@@ -191,7 +183,7 @@ void generateTree(const YamlCursor& at, const ReadContext& context, int first_ro
       if (edge > parent.nodes - 3)
       {
         place.problem("gives " + tree.name + "_" + std::to_string(branch.parent) + " too few (" +
-                      std::to_string(parent.nodes) + ") for its " + std::to_string(shape.children) +
+                      std::to_string(parent.nodes) + ") for its " + std::to_string(tree.children) +
                       " children; raise it, or lower levels or children");
         return;
       }

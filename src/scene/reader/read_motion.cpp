@@ -1,3 +1,4 @@
+#include <type_traits>
 
 #include "read_parts.h"
 #include "slender_sim/scene/pose_file.h"
@@ -51,35 +52,6 @@ std::optional<TableMotion> readFileMotion(const YamlCursor& path, const YamlCurs
                                  " holds several bodies, of which it names one: " + joinWords(names));
 }
 
-/// The keys that say how something moves.
-struct PoseKeys
-{
-  YamlCursor topic, body, tf, offset, table, file;
-
-  /// Number of ways in which they say it.
-  int given() const { return topic.present() + tf.present() + table.present() + (body.present() || file.present()); }
-};
-
-/// Reads the keys, of which some mean different things for different objects.
-PoseKeys readPoseKeys(const YamlCursor& at, const char* topic, const char* body, const char* table)
-{
-  YamlMap map(at);
-  PoseKeys keys{
-      map.get("topic", topic),
-      map.get("body", body),
-      map.get("tf",
-              "Name of a frame of tf that is followed, for example tool0; a node looks it up, and without a "
-              "node nothing moves."),
-      map.get("offset", "With `tf`: pose in the frame of what is moved. Without the key: the frame's own pose."),
-      map.get("table", table),
-      map.get("file",
-              "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, give `body` "
-              "as well.")};
-  if (keys.offset.present() && !keys.tf.present())
-    keys.offset.problem("is for motion: {tf: FRAME}");
-  return keys;
-}
-
 /// Returns nothing if a problem was reported.
 std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
 {
@@ -93,24 +65,59 @@ std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
   return motion;
 }
 
-/// Reads the motion that the keys give in one way: by messages, with a frame of tf, or by timed poses. It is fixed if a
+/// What the keys of a motion mean for one kind of things.
+struct MotionTexts
+{
+  const char *topic, *body, *table;
+  std::string kinds;   ///< what a motion must be
+};
+
+/// Reads a motion that is a map: by messages, with a frame of tf, with a body, or by timed poses. It is fixed if a
 /// problem was reported.
 template <class SomeMotion>
-SomeMotion readKeys(const PoseKeys& keys, const ReadContext& context, bool needs_orientation)
+SomeMotion readMap(const YamlCursor& at, const MotionTexts& texts, const ReadContext& context, bool needs_orientation)
 {
   SomeMotion motion = FixedMotion{};
-  if (keys.topic.present())
+  const std::size_t before = at.problems().size();
+  YamlMap map(at);
+  const YamlCursor topic = map.get("topic", texts.topic);
+  const YamlCursor body = map.get("body", texts.body);
+  const YamlCursor tf = map.get("tf",
+                                "Name of a frame of tf that is followed, for example tool0; a node looks it up, and "
+                                "without a node nothing moves.");
+  const YamlCursor offset =
+      map.get("offset", "With `tf`: pose in the frame of what is moved. Without the key: the frame's own pose.");
+  const YamlCursor table = map.get("table", texts.table);
+  const YamlCursor file = map.get("file",
+                                  "CSV file with the columns t,body,x,y,z,qx,qy,qz,qw. If it holds several bodies, "
+                                  "give `body` as well.");
+  if (offset.present() && !tf.present())
+    offset.problem("is for motion: {tf: FRAME}");
+  map.finish();
+  constexpr bool may_follow = std::is_same_v<SomeMotion, Motion>;
+  const bool follows = body.present() && !file.present();
+  const int given = topic.present() + tf.present() + table.present() + (body.present() || file.present());
+  if (given != 1 || (follows && !may_follow))
   {
-    if (!keys.topic.boolean().value_or(true))
-      keys.topic.problem("must be true; without a topic it is written motion: fixed");
+    if (at.problems().size() == before)
+      at.problem("must be " + texts.kinds);
+    return motion;
+  }
+  if (topic.present())
+  {
+    if (!topic.boolean().value_or(true))
+      topic.problem("must be true; without a topic it is written motion: fixed");
     motion = TopicMotion{};
   }
-  else if (keys.tf.present())
-    assign(motion, readTf(keys.tf, keys.offset));
-  else if (keys.table.present())
-    assign(motion, readTable(keys.table, needs_orientation));
-  else
-    assign(motion, readFileMotion(keys.file, keys.body, context));
+  else if (tf.present())
+    assign(motion, readTf(tf, offset));
+  else if (table.present())
+    assign(motion, readTable(table, needs_orientation));
+  else if (!follows)
+    assign(motion, readFileMotion(file, body, context));
+  else if constexpr (may_follow)
+    if (const auto name = body.text())
+      motion = BodyMotion{*name};
   return motion;
 }
 
@@ -129,34 +136,19 @@ std::optional<std::string> readFrameName(const YamlCursor& at)
 
 Motion readMotion(const YamlCursor& at, const ReadContext& context, bool needs_orientation)
 {
-  Motion motion = FixedMotion{};
   at.sharesKeysOf("rods.N.grasps.NAME.motion");
-  if (!at.present())
-    return motion;
   if (at.isScalar())
-  {
-    assign(motion, at.choice<Motion>({{"fixed", FixedMotion{}}, {"topic", TopicMotion{}}}));
-    return motion;
-  }
-  const std::size_t before = at.problems().size();
-  const PoseKeys keys = readPoseKeys(
-      at, "Must be true: the motion comes by messages. Same as the word topic.",
+    return at.choice<Motion>({{"fixed", FixedMotion{}}, {"topic", TopicMotion{}}}).value_or(FixedMotion{});
+  if (!at.present())
+    return FixedMotion{};
+  const MotionTexts texts{
+      "Must be true: the motion comes by messages. Same as the word topic.",
       "Name of the body to follow: a driven body or an obstacle of the scene, or one that only messages tell of. With "
       "`file`: name of the body in the file.",
       "Timed poses: rows [t, x, y, z, qx, qy, qz, qw], with t in s, lengths in m and a unit quaternion. Poses between "
-      "rows are interpolated smoothly.");
-  if (keys.given() != 1 && at.problems().size() == before)
-  {
-    at.problem(
-        "must be fixed or one of {topic: true}, {tf: FRAME}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}");
-  }
-  if (keys.given() != 1)
-    return motion;
-  if (!keys.body.present() || keys.file.present())
-    return readKeys<Motion>(keys, context, needs_orientation);
-  if (const auto name = keys.body.text())
-    motion = BodyMotion{*name};
-  return motion;
+      "rows are interpolated smoothly.",
+      "fixed or one of {topic: true}, {tf: FRAME}, {body: NAME}, {table: [...]}, {file: PATH, body: NAME}"};
+  return readMap<Motion>(at, texts, context, needs_orientation);
 }
 
 std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadContext& context, bool may_be_free)
@@ -167,29 +159,20 @@ std::optional<GivenMotion> readSolidMotion(const YamlCursor& at, const ReadConte
     return may_be_free ? std::nullopt : fixed;
   if (at.isScalar())
   {
-    std::vector<std::pair<std::string, std::optional<GivenMotion>>> words{{"fixed", fixed},
-                                                                          {"topic", GivenMotion{TopicMotion{}}}};
+    Choices<std::optional<GivenMotion>> words{{"fixed", fixed}, {"topic", GivenMotion{TopicMotion{}}}};
     if (may_be_free)
       words.emplace_back("free", std::nullopt);
     return at.choice(words).value_or(fixed);
   }
-  const std::size_t before = at.problems().size();
-  const PoseKeys keys = readPoseKeys(
-      at,
+  const MotionTexts texts{
       "Must be true: the motion comes by messages on the topic `bodies`, or `nozzle/pose` for a nozzle. Same as the "
       "word topic.",
       "Name of the body in `file`.",
       "Timed poses: rows [t, x, y, z, qx, qy, qz, qw] or [t, x, y, z], with t in s, lengths in m and a unit "
-      "quaternion. "
-      "Poses between rows are interpolated smoothly.");
-  if (keys.given() == 1 && (keys.file.present() || !keys.body.present()))
-    return readKeys<GivenMotion>(keys, context, false);
-  if (at.problems().size() == before)
-  {
-    at.problem(std::string("must be ") + (may_be_free ? "free, " : "") +
-               "fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}");
-  }
-  return fixed;
+      "quaternion. Poses between rows are interpolated smoothly.",
+      std::string(may_be_free ? "free, " : "") +
+          "fixed or one of {topic: true}, {tf: FRAME}, {table: [...]}, {file: PATH, body: NAME}"};
+  return readMap<GivenMotion>(at, texts, context, false);
 }
 
 }   // namespace slender

@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "read_parts.h"
-#include "slender_sim/scene/shapes.h"
 
 namespace slender {
 
@@ -84,7 +83,7 @@ Recorded recordedOf(const SceneConfig& scene, bool known)
   for (const RodConfig& rod : scene.rods)
   {
     all.names.push_back(rod.name);
-    all.counts.push_back(known ? static_cast<int>(restNodes(rod, scene.gravity).cols()) : 0);
+    all.counts.push_back(known ? rod.nodes() : 0);
   }
   for (const ClothConfig& cloth : scene.cloths)
   {

@@ -60,22 +60,16 @@ void CrossingWatch::pairHeld(Kind kind, int index, double reach, const std::vect
   const SceneConfig& scene = simulation_.config();
   const auto object = std::find_if(objects_.begin(), objects_.end(),
                                    [&](const Object& o) { return o.kind == kind && o.index == index; });
-  HeldPair pair{static_cast<int>(object - objects_.begin()), -1, -1, reach, 0.0, &ignored};
-  for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
-  {
-    pair.obstacle = static_cast<int>(k);
-    pair.radius = boundingRadius(scene.obstacles[k].shape);
-    held_.push_back(pair);
-  }
-  pair.obstacle = -1;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b)
+  const auto add = [&](int obstacle, int body, const Shape& shape) {
+    held_.push_back(
+        {static_cast<int>(object - objects_.begin()), obstacle, body, reach, boundingRadius(shape), &ignored});
+  };
+  for (int k = 0; k < static_cast<int>(scene.obstacles.size()); ++k)
+    add(k, -1, scene.obstacles[k].shape);
+  for (int b = 0; b < static_cast<int>(scene.bodies.size()); ++b)
     if (const BodyConfig& body = scene.bodies[b];
         body.motion && body.isSolid() && !(kind == Kind::rod && body.isWeldedTo(index)))
-    {
-      pair.body = static_cast<int>(b);
-      pair.radius = boundingRadius(*body.shape);
-      held_.push_back(pair);
-    }
+      add(-1, b, *body.shape);
 }
 
 CrossingWatch::Pieces CrossingWatch::piecesOf(const Object& object) const

@@ -153,27 +153,17 @@ void ignoreOf(const std::vector<GraspConfig>& grasps, const HeldObject& object, 
     object.ignored.push_back(std::move(solid));
 }
 
-std::vector<std::vector<int>> neighboursOf(const RodConfig& rod, int nodes)
+/// Neighbours of points that so many edges join. ends(edge): its two points.
+template <class Ends>
+std::vector<std::vector<int>> neighboursOf(int points, int edges, const Ends& ends)
 {
-  std::vector<std::vector<int>> neighbours(static_cast<std::size_t>(nodes));
-  for (int j = 0; j + 1 < nodes || (rod.closed && j < nodes); ++j)
+  std::vector<std::vector<int>> neighbours(static_cast<std::size_t>(points));
+  for (int e = 0; e < edges; ++e)
   {
-    const int next = (j + 1) % nodes;
-    neighbours[j].push_back(next);
-    neighbours[next].push_back(j);
+    const auto [a, b] = ends(e);
+    neighbours[a].push_back(b);
+    neighbours[b].push_back(a);
   }
-  return neighbours;
-}
-
-std::vector<std::vector<int>> neighboursOf(const TriangleMesh& mesh)
-{
-  std::vector<std::vector<int>> neighbours(static_cast<std::size_t>(mesh.vertices.cols()));
-  for (Eigen::Index t = 0; t < mesh.triangles.cols(); ++t)
-    for (int k = 0; k < 3; ++k)
-    {
-      neighbours[mesh.triangles(k, t)].push_back(mesh.triangles((k + 1) % 3, t));
-      neighbours[mesh.triangles(k, t)].push_back(mesh.triangles((k + 2) % 3, t));
-    }
   return neighbours;
 }
 
@@ -195,9 +185,10 @@ void ignoreHeldContacts(SceneConfig& scene, SceneParts& parts)
       continue;
     const RodModel& model = *parts.model.rods[r].model;
     const double radius = std::max(model.radius_a.maxCoeff(), model.radius_b.maxCoeff());
+    const auto ends = [&model](int j) { return std::make_pair(j, (j + 1) % model.nodes()); };
     const HeldObject object{"rod " + rod.name,
                             parts.state.rods[r].x,
-                            neighboursOf(rod, model.nodes()),
+                            neighboursOf(model.nodes(), model.edges(), ends),
                             radius + scene.contact.gap,
                             false,
                             parts.model.rods[r].ignored};
@@ -208,9 +199,11 @@ void ignoreHeldContacts(SceneConfig& scene, SceneParts& parts)
     const ClothConfig& cloth = scene.cloths[c];
     if (!matters(cloth))
       continue;
+    const MeshTopology& topology = parts.model.cloths[c].model->topology;
+    const auto ends = [&topology](int e) { return std::make_pair(topology.edges(0, e), topology.edges(1, e)); };
     const HeldObject object{"cloth " + cloth.name,
                             parts.state.cloths[c].x,
-                            neighboursOf(cloth.mesh),
+                            neighboursOf(static_cast<int>(cloth.mesh.vertices.cols()), topology.edgeCount(), ends),
                             0.5 * cloth.contact->thickness + scene.contact.gap,
                             cloth.contact->method == ContactMethod::impulses,
                             parts.model.cloths[c].ignored};

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 namespace slender {
 
@@ -43,15 +42,9 @@ double defaultStrainLimit(const RodConfig& rod)
   return modulus >= kStiffModulus ? kStiffStrain : kSoftStrain;
 }
 
-/// The largest strain of so many edges, and the edge that has it. stretch(edge): its length over that at rest.
-template <class Stretch>
-std::pair<double, std::size_t> largestStrain(std::size_t edges, const Stretch& stretch)
+double edgeLength(const ClothModel& model, const Eigen::Matrix3Xd& x, int edge)
 {
-  std::pair<double, std::size_t> worst{0.0, 0};
-  for (std::size_t e = 0; e < edges; ++e)
-    if (const double strain = std::abs(stretch(e) - 1.0); strain > worst.first)
-      worst = {strain, e};
-  return worst;
+  return (x.col(model.topology.edges(1, edge)) - x.col(model.topology.edges(0, edge))).norm();
 }
 
 const Pose& nozzlePose(const ThreadGroupState& group) { return group.threads.front().ends[1].X_WE; }
@@ -63,17 +56,12 @@ LimitWatch::LimitWatch(Simulation& simulation) : simulation_(simulation), limits
   for (const RodConfig& rod : simulation.config().rods)
     rod_strain_limits_.push_back(limits_.strain.value_or(defaultStrainLimit(rod)));
   cloth_strain_limit_ = limits_.strain.value_or(kSoftStrain);
-  for (const ClothConfig& cloth : simulation.config().cloths)
+  for (int c = 0; c < static_cast<int>(simulation.config().cloths.size()); ++c)
   {
-    std::set<std::pair<int, int>> edges;
-    const Eigen::Matrix3Xi& faces = cloth.mesh.triangles;
-    for (Eigen::Index f = 0; f < faces.cols(); ++f)
-      for (int k = 0; k < 3; ++k)
-        edges.insert(std::minmax({faces(k, f), faces((k + 1) % 3, f)}));
-    cloth_edges_.emplace_back(edges.begin(), edges.end());
-    cloth_lengths_.emplace_back();
-    for (const auto& [a, b] : cloth_edges_.back())
-      cloth_lengths_.back().push_back((cloth.mesh.vertices.col(b) - cloth.mesh.vertices.col(a)).norm());
+    const ClothModel& model = simulation.clothModel(c);
+    cloth_lengths_.emplace_back(model.topology.edgeCount());
+    for (int e = 0; e < model.topology.edgeCount(); ++e)
+      cloth_lengths_.back()[e] = edgeLength(model, model.rest.vertices, e);
   }
 }
 
@@ -226,43 +214,45 @@ void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
 {
   if (limits_.strain && std::isinf(*limits_.strain))
     return;
-  for (std::size_t r = 0; r < simulation_.config().rods.size(); ++r)
-    checkRodStrain(static_cast<int>(r), begun);
-  for (std::size_t k = 0; k < simulation_.config().cloths.size(); ++k)
-    checkClothStrain(static_cast<int>(k), begun);
-}
-
-void LimitWatch::checkRodStrain(int rod, std::vector<LimitExcess>& begun)
-{
-  const double limit = rod_strain_limits_[static_cast<std::size_t>(rod)];
-  const RodModel& model = simulation_.rodModel(rod);
-  const Eigen::Matrix3Xd& x = simulation_.state().rods[rod].x;
-  const auto [strain, worst] = largestStrain(static_cast<std::size_t>(model.edges()), [&](std::size_t j) {
-    const auto edge = static_cast<Eigen::Index>(j);
-    return (x.col((edge + 1) % x.cols()) - x.col(edge)).norm() / model.rest_length[edge];
-  });
-  if (isQuiet({LimitKind::strain, rod}, strain, limit))
-    return;
-  look({LimitKind::strain, rod}, strain, limit,
-       "rod '" + model.name + "', edge " + std::to_string(worst) + ": its strain", "", mostLoaded(rod, -1), begun);
-}
-
-void LimitWatch::checkClothStrain(int cloth, std::vector<LimitExcess>& begun)
-{
-  const Eigen::Matrix3Xd& x = simulation_.state().cloths[cloth].x;
-  const auto& edges = cloth_edges_[cloth];
-  const auto [strain, worst] = largestStrain(edges.size(), [&](std::size_t e) {
-    return (x.col(edges[e].second) - x.col(edges[e].first)).norm() / cloth_lengths_[cloth][e];
-  });
   const int rods = static_cast<int>(simulation_.config().rods.size());
-  if (isQuiet({LimitKind::strain, rods + cloth}, strain, cloth_strain_limit_))
-    return;
-  const std::string where = edges.empty() ? ""
-                                          : ", between vertices " + std::to_string(edges[worst].first) + " and " +
-                                                std::to_string(edges[worst].second);
-  look({LimitKind::strain, rods + cloth}, strain, cloth_strain_limit_,
-       "cloth '" + simulation_.config().cloths[cloth].name + "'" + where + ": its strain", "", mostLoaded(-1, cloth),
-       begun);
+  for (int r = 0; r < rods; ++r)
+  {
+    const RodModel& model = simulation_.rodModel(r);
+    const Eigen::Matrix3Xd& x = simulation_.state().rods[r].x;
+    const auto stretch = [&](int j) { return (x.col((j + 1) % x.cols()) - x.col(j)).norm() / model.rest_length[j]; };
+    const auto name = [&](int j) { return "rod '" + model.name + "', edge " + std::to_string(j); };
+    checkStrain({LimitKind::strain, r}, rod_strain_limits_[r], model.edges(), stretch, name, {r, -1}, begun);
+  }
+  for (int c = 0; c < static_cast<int>(simulation_.config().cloths.size()); ++c)
+  {
+    const ClothModel& model = simulation_.clothModel(c);
+    const Eigen::Matrix3Xd& x = simulation_.state().cloths[c].x;
+    const auto stretch = [&](int e) { return edgeLength(model, x, e) / cloth_lengths_[c][e]; };
+    const auto name = [&](int e) {
+      const auto [a, b] = std::minmax({model.topology.edges(0, e), model.topology.edges(1, e)});
+      return "cloth '" + model.name + "', between vertices " + std::to_string(a) + " and " + std::to_string(b);
+    };
+    checkStrain({LimitKind::strain, rods + c}, cloth_strain_limit_, model.topology.edgeCount(), stretch, name, {-1, c},
+                begun);
+  }
+}
+
+/// Checks the largest strain of so many edges of a rod or cloth. stretch(edge): its length over that at rest;
+/// name(edge): for messages. `held`: index of the rod and of the cloth; the other is -1.
+template <class Stretch, class Name>
+void LimitWatch::checkStrain(const Key& key, double limit, int edges, const Stretch& stretch, const Name& name,
+                             const std::pair<int, int>& held, std::vector<LimitExcess>& begun)
+{
+  double strain = 0.0;
+  int worst = 0;
+  for (int e = 0; e < edges; ++e)
+    if (const double here = std::abs(stretch(e) - 1.0); here > strain)
+    {
+      strain = here;
+      worst = e;
+    }
+  if (!isQuiet(key, strain, limit))
+    look(key, strain, limit, name(worst) + ": its strain", "", mostLoaded(held.first, held.second), begun);
 }
 
 /// Returns the active grasp with the largest force of a rod or cloth. Returns no grasp if there is none, and without

@@ -31,14 +31,11 @@ std::unique_ptr<World> buildWorld(const SceneConfig& config, WorldModel model, W
 /// Returns the poses of the welded parts in their bodies, for a world that was just built from this state.
 std::vector<Pose> weldPoses(const SceneConfig& config, const WorldModel& model, const SceneState& state)
 {
-  std::vector<std::size_t> next;   // per rod: index of the next weld, after the rod's own grasps
-  for (const RodConfig& rod : config.rods)
-    next.push_back(rod.grasps.size());
   std::vector<Pose> poses;
-  for (const WorldModel::RodWeld& weld : model.welds)
+  for (const BodyWeld& weld : weldsOf(config))
   {
-    const Pose& X_WG = state.rods[weld.rod].grasps[next[weld.rod]++].X_WG;
-    poses.push_back(weld.X_BG.value_or(state.bodies[weld.body].X_WB.inverse() * X_WG));
+    const Pose& X_WG = state.rods[weld.rod].grasps[weld.grasp].X_WG;
+    poses.push_back(model.welds[poses.size()].X_BG.value_or(state.bodies[weld.body].X_WB.inverse() * X_WG));
   }
   return poses;
 }

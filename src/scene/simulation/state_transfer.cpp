@@ -42,13 +42,7 @@ void takeEntries(const std::vector<int>& same, const std::vector<Value>& from, s
 
 bool isNew(int same) { return same < 0; }
 
-/// A weld of a scene. Lists are in the order of WorldModel::welds.
-struct BodyWeld
-{
-  int body, index;     ///< indices of the body, and of the weld among the welds of this body
-  int rod;             ///< that it holds
-  std::size_t grasp;   ///< index among the grasps of the rod: welds follow its own grasps, in the order of all welds
-};
+}   // namespace
 
 std::vector<BodyWeld> weldsOf(const SceneConfig& config)
 {
@@ -65,14 +59,13 @@ std::vector<BodyWeld> weldsOf(const SceneConfig& config)
   return welds;
 }
 
-}   // namespace
-
 StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before, const SceneConfig& to,
                              const std::vector<GraspRef>& now)
-  : from_(from),
-    to_(to),
+  : to_(to),
     before_(before.begin(), before.end()),
-    now_(now)
+    now_(now),
+    welds_before_(weldsOf(from)),
+    welds_now_(weldsOf(to))
 {
   rods_ = sameNames(from.rods, to.rods);
   threads_ = sameNames(from.threads, to.threads);
@@ -87,9 +80,8 @@ StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before,
       return held && other.config->name == grasp.config->name;
     }));
   }
-  const std::vector<BodyWeld> welds_before = weldsOf(from);
-  for (const BodyWeld& weld : weldsOf(to))
-    welds_.push_back(indexWhere(welds_before, [&](const BodyWeld& other) {
+  for (const BodyWeld& weld : welds_now_)
+    welds_.push_back(indexWhere(welds_before_, [&](const BodyWeld& other) {
       return other.body == bodies_[weld.body] && other.index == weld.index;
     }));
 }
@@ -129,11 +121,10 @@ void StateTransfer::checkTables(double time) const
 
 std::string StateTransfer::newWelds() const
 {
-  const std::vector<BodyWeld> welds = weldsOf(to_);
-  for (std::size_t w = 0; w < welds.size(); ++w)
+  for (std::size_t w = 0; w < welds_now_.size(); ++w)
   {
-    const BodyConfig& body = to_.bodies[welds[w].body];
-    const int rod = welds[w].rod;
+    const BodyConfig& body = to_.bodies[welds_now_[w].body];
+    const int rod = welds_now_[w].rod;
     if (isNew(welds_[w]) && !isNew(rods_[rod]))
       return "body " + body.name + " was welded to rod " + to_.rods[rod].name +
              " while it moved, so that the two do not fit together where the scene starts; ~remove " + body.name +
@@ -182,12 +173,11 @@ bool StateTransfer::isHeldAsBefore(int rod) const
   for (std::size_t g = 0; g < now_.size(); ++g)
     if (now_[g].cloth < 0 && now_[g].rod == rod)
       grasps_now.push_back(grasps_[g]);
-  const std::vector<BodyWeld> from = weldsOf(from_), to = weldsOf(to_);
-  for (int w = 0; w < static_cast<int>(from.size()); ++w)
-    if (from[w].rod == rods_[rod])
+  for (int w = 0; w < static_cast<int>(welds_before_.size()); ++w)
+    if (welds_before_[w].rod == rods_[rod])
       welds_before.push_back(w);
-  for (std::size_t w = 0; w < to.size(); ++w)
-    if (to[w].rod == rod)
+  for (std::size_t w = 0; w < welds_now_.size(); ++w)
+    if (welds_now_[w].rod == rod)
       welds_now.push_back(welds_[w]);
   return grasps_before == grasps_now && welds_before == welds_now;
 }
@@ -270,13 +260,12 @@ void StateTransfer::takeAdded(const SceneState& before, SceneState& state) const
   takeContacts(bodies_, before.contact.bodies, state.contact.bodies);
   takeContacts(cloths_, before.contact.cloths, state.contact.cloths);
 
-  const std::vector<BodyWeld> from = weldsOf(from_), to = weldsOf(to_);
   for (std::size_t w = 0; w < welds_.size(); ++w)
   {
     if (isNew(welds_[w]))
       continue;
-    const BodyWeld& old = from[static_cast<std::size_t>(welds_[w])];
-    GraspState& grasp = state.rods[to[w].rod].grasps[to[w].grasp];
+    const BodyWeld& old = welds_before_[static_cast<std::size_t>(welds_[w])];
+    GraspState& grasp = state.rods[welds_now_[w].rod].grasps[welds_now_[w].grasp];
     const int body = grasp.body;
     grasp = before.rods[old.rod].grasps[old.grasp];
     grasp.body = body;

@@ -10,6 +10,16 @@
 /// scenes, and likewise grasps of the same object.
 namespace slender {
 
+/// A weld of a scene. Lists are in the order of WorldModel::welds.
+struct BodyWeld
+{
+  int body, index;     ///< indices of the body, and of the weld among the welds of this body
+  int rod;             ///< that it holds
+  std::size_t grasp;   ///< index among the grasps of the rod: welds follow its own grasps, in the order of all welds
+};
+/// All welds of a scene.
+std::vector<BodyWeld> weldsOf(const SceneConfig& config);
+
 class StateTransfer
 {
 public:
@@ -42,8 +52,9 @@ private:
                     std::vector<ContactMemory>& to) const;
   void takeGrasps(const SceneState& before, SceneState& state) const;
 
-  const SceneConfig &from_, &to_;
+  const SceneConfig& to_;
   const std::vector<GraspRef> before_, now_;
+  const std::vector<BodyWeld> welds_before_, welds_now_;
   // per object, grasp or weld of the edited scene: its index in the scene before the edit; -1: it is new
   std::vector<int> rods_, threads_, cloths_, bodies_, obstacles_, grasps_, welds_;
 };
