@@ -101,6 +101,24 @@ geometry_msgs::Twist toMessage(const Twist& twist)
   return out;
 }
 
+std_msgs::Header makeHeader(const ros::Time& stamp, const std::string& frame_id)
+{
+  std_msgs::Header header;
+  header.stamp = stamp;
+  header.frame_id = frame_id;
+  return header;
+}
+
+geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child, const Pose& X)
+{
+  geometry_msgs::TransformStamped out;
+  out.header = header;
+  out.child_frame_id = child;
+  out.transform.translation = toVector3(X.position);
+  out.transform.rotation = toQuaternion(X.orientation);
+  return out;
+}
+
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
 Eigen::Vector3d fromMessage(const geometry_msgs::Vector3& v) { return {v.x, v.y, v.z}; }
 Eigen::Quaterniond fromMessage(const geometry_msgs::Quaternion& q) { return {q.w, q.x, q.y, q.z}; }
@@ -185,10 +203,8 @@ void toTracking(const RodConfig& rod, const GuideState& guide, const RodState& s
 void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out)
 {
   forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) {
-    geometry_msgs::Pose pose;
-    pose.position = toPoint(0.5 * (state.x.col(j) + state.x.col((j + 1) % model.nodes())));
-    pose.orientation = toQuaternion(Eigen::Quaterniond(axes).normalized());
-    out.push_back(pose);
+    const Eigen::Vector3d middle = 0.5 * (state.x.col(j) + state.x.col((j + 1) % model.nodes()));
+    out.push_back(toMessage(Pose{middle, Eigen::Quaterniond(axes).normalized()}));
   });
 }
 

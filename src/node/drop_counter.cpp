@@ -9,21 +9,10 @@ namespace slender {
 
 const char* toString(Drop reason)
 {
-  switch (reason)
-  {
-    case Drop::not_finite: return "not_finite";
-    case Drop::bad_quaternion: return "bad_quaternion";
-    case Drop::wrong_length: return "wrong_length";
-    case Drop::unknown_name: return "unknown_name";
-    case Drop::bad_frame: return "bad_frame";
-    case Drop::no_transform: return "no_transform";
-    case Drop::out_of_order: return "out_of_order";
-    case Drop::stale: return "stale";
-    case Drop::from_future: return "from_future";
-    case Drop::out_of_range: return "out_of_range";
-    case Drop::queue_full: return "queue_full";
-  }
-  return "?";
+  static const char* const words[kDropReasons] = {"not_finite",  "bad_quaternion", "wrong_length", "unknown_name",
+                                                  "bad_frame",   "no_transform",   "out_of_order", "stale",
+                                                  "from_future", "out_of_range",   "queue_full"};
+  return words[static_cast<int>(reason)];
 }
 
 void DropCounter::drop(Drop reason, const std::string& what, const std::string& detail)

@@ -46,12 +46,7 @@ FrameBroadcaster::FrameBroadcaster(ros::NodeHandle& nh, const std::string& node,
 
 void FrameBroadcaster::add(const std::string& child, const Pose& X_WC, const ros::Time& stamp)
 {
-  geometry_msgs::TransformStamped& transform = message_.transforms.emplace_back();
-  transform.header.stamp = stamp;
-  transform.header.frame_id = frame_id_;
-  transform.child_frame_id = child;
-  transform.transform.translation = toVector3(X_WC.position);
-  transform.transform.rotation = toQuaternion(X_WC.orientation);
+  message_.transforms.push_back(toTransform(makeHeader(stamp, frame_id_), child, X_WC));
 }
 
 void FrameBroadcaster::broadcast(const Simulation& simulation, const ros::Time& stamp)

@@ -9,7 +9,7 @@
 namespace slender {
 
 GuideBuffer::GuideBuffer(const Options& options, Attach attach, const Pose& X_WG, const std::optional<Pose>& X_HG)
-  : GuideStream(options.timing(), options.coast, options.catch_up_time),
+  : GuideStream(options, options.catch_up_time),
     options_(options),
     attach_(X_HG ? Attach::section : attach),
     X_HG_(X_HG.value_or(Pose()))

@@ -28,12 +28,8 @@ std::vector<GuideInputs::Age> GuideInputs::ages() const
   {
     if (!guided.buffer)
       continue;
-    std::optional<double> age = guided.buffer->lastTime();
-    if (age)
-      age = clock_.seconds() - *age;
     const std::string name = guided.name + (guided.frame.empty() ? "" : " (tf " + guided.frame + ")");
-    ages.push_back({name, age, false, guided.buffer->timing().lag(), guided.buffer->timing().excess(),
-                    guided.buffer->timing().interval()});
+    ages.push_back(TrackingInputs::ageOf(name, *guided.buffer, clock_.seconds()));
   }
   for (const Age& age : tracking_->ages())
     ages.push_back(age);

@@ -7,17 +7,9 @@ namespace {
 
 const char* folderOf(ObjectKind kind)
 {
-  switch (kind)
-  {
-    case ObjectKind::rod: return "rods/";
-    case ObjectKind::thread: return "threads/";
-    case ObjectKind::cloth: return "cloths/";
-    case ObjectKind::body: return "bodies/";
-    case ObjectKind::obstacle: return "obstacles";   // one namespace, as in the pictures of nodes
-    case ObjectKind::gripper: return "grasps/";
-    case ObjectKind::nozzle: return "nozzles/";
-  }
-  return "";
+  // obstacles have one namespace, as in the pictures of nodes
+  static const char* const folders[] = {"rods/", "threads/", "cloths/", "bodies/", "obstacles", "grasps/", "nozzles/"};
+  return folders[static_cast<int>(kind)];
 }
 
 }   // namespace

@@ -107,24 +107,16 @@ void MotionPlayer::waitForSubscribers()
 
 void MotionPlayer::publish(const Instant& instant, const ros::Time& stamp)
 {
+  const std_msgs::Header header = makeHeader(stamp, frame_id_);
   if (tf_)
   {
     tf2_msgs::TFMessage message;
     for (const auto& [name, X] : instant.bodies)
-    {
-      geometry_msgs::TransformStamped transform;
-      transform.header.stamp = stamp;
-      transform.header.frame_id = frame_id_;
-      transform.child_frame_id = name;
-      transform.transform.translation = toVector3(X.position + offset_);
-      transform.transform.rotation = toQuaternion(X.orientation);
-      message.transforms.push_back(transform);
-    }
+      message.transforms.push_back(toTransform(header, name, {X.position + offset_, X.orientation}));
     tf_pub_.publish(message);
   }
   slender_sim::BodyStates solids;
-  solids.header.stamp = stamp;
-  solids.header.frame_id = frame_id_;
+  solids.header = header;
   for (const std::string& name : solids_)
     if (const auto body = instant.bodies.find(name); body != instant.bodies.end())
     {
@@ -139,8 +131,7 @@ void MotionPlayer::publish(const Instant& instant, const ros::Time& stamp)
     if (body == instant.bodies.end())
       continue;
     geometry_msgs::PoseStamped message;
-    message.header.stamp = stamp;
-    message.header.frame_id = tf_ ? name : frame_id_;
+    message.header = makeHeader(stamp, tf_ ? name : frame_id_);
     message.pose = tf_ ? toMessage(Pose()) : toMessage(Pose{body->second.position + offset_, body->second.orientation});
     publisher.publish(message);
   }

@@ -75,14 +75,8 @@ NodeOptions NodeOptions::read(const ros::NodeHandle& nh_priv)
 
 const char* toString(Pace pace)
 {
-  switch (pace)
-  {
-    case Pace::wall: return "wall";
-    case Pace::fast: return "fast";
-    case Pace::follow: return "follow";
-    case Pace::step: return "step";
-  }
-  return "?";
+  static const char* const words[] = {"wall", "fast", "follow", "step"};
+  return words[static_cast<int>(pace)];
 }
 
 }   // namespace slender

@@ -10,7 +10,7 @@ double largest(const Eigen::Matrix3Xd& m) { return m.cols() > 0 ? m.colwise().no
 }   // namespace
 
 PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points)
-  : GuideStream(options.timing(), options.coast, options.catch_up_time),
+  : GuideStream(options, options.catch_up_time),
     options_(options)
 {
   if (!(options.catch_up_time > 0.0) || !(options.catch_up_speed > 0.0))

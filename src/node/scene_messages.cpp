@@ -28,8 +28,7 @@ void append(const std::string& name, const Pose& X, const Twist& velocity, slend
 slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id)
 {
   slender_sim::MeshStamped mesh;
-  mesh.header.stamp = stamp;
-  mesh.header.frame_id = frame_id;
+  mesh.header = makeHeader(stamp, frame_id);
   for (std::size_t k = 0; k < simulation.config().cloths.size(); ++k)
     append(simulation.clothModel(static_cast<int>(k)), mesh);
   return mesh;
@@ -38,8 +37,7 @@ slender_sim::MeshStamped clothMesh(const Simulation& simulation, const ros::Time
 void SceneMessages::fill(const Simulation& simulation, const ros::Time& stamp, const std::string& frame_id,
                          std::uint32_t epoch)
 {
-  header.stamp = stamp;
-  header.frame_id = frame_id;
+  header = makeHeader(stamp, frame_id);
   epoch_ = epoch;
   fillRods(simulation);
   fillThreads(simulation);

@@ -5,7 +5,6 @@
 #include <iostream>
 
 #include <geometry_msgs/PoseArray.h>
-#include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <rosgraph_msgs/Clock.h>
 #include <std_msgs/String.h>
@@ -45,12 +44,6 @@ void requireObjects(const SceneConfig& scene, NodeKind kind)
   }
 }
 
-SceneConfig loadScene(const NodeOptions& options, const ros::NodeHandle& nh)
-{
-  setRobotSources(rosSources(nh));
-  return readScene(options);
-}
-
 }   // namespace
 
 void SceneNode::checkKind(const SceneConfig& scene, const NodeOptions& options, NodeKind kind)
@@ -80,7 +73,8 @@ SceneNode::SceneNode(const ros::NodeHandle& nh, const ros::NodeHandle& nh_priv, 
   nh_priv_.setCallbackQueue(&services_queue_);
   openReplay();
   checkClock();
-  SceneConfig scene = loadScene(options_, nh_);
+  setRobotSources(rosSources(nh_));
+  SceneConfig scene = readScene(options_);
   checkKind(scene, options_, kind_);
   simulation_ = std::make_unique<Simulation>(std::move(scene));
   if (simulation_->config().statics)
@@ -132,7 +126,7 @@ void SceneNode::start()
   anchor();
   std_msgs::String scene;
   scene.data = simulation_->config().source;
-  scene_pub_.publish(scene);
+  pubs_.scene.publish(scene);
   if (bag_)
     bag_->recordScene(scene.data, clock_.stamp());
   if (topics_->has_cloths)
@@ -158,7 +152,7 @@ void SceneNode::makeInputs()
 void SceneNode::publishMesh()
 {
   const slender_sim::MeshStamped mesh = clothMesh(*simulation_, clock_.stamp(), options_.frame_id);
-  mesh_pub_.publish(mesh);
+  pubs_.mesh.publish(mesh);
   if (bag_)
     bag_->recordMesh(mesh);
 }
@@ -168,26 +162,26 @@ void SceneNode::advertise()
   const SceneTopics& names = *topics_;
   if (names.has_rods)
   {
-    rod_state_pub_ = nh_.advertise<slender_sim::RodState>(names.rods + "state", 1000);
-    rod_poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>(names.rods + "poses", 100);
+    pubs_.rod_state = nh_.advertise<slender_sim::RodState>(names.rods + "state", 1000);
+    pubs_.rod_poses = nh_.advertise<geometry_msgs::PoseArray>(names.rods + "poses", 100);
   }
   if (names.has_threads)
   {
-    thread_state_pub_ = nh_.advertise<slender_sim::ThreadState>(names.threads + "state", 1000);
-    thread_poses_pub_ = nh_.advertise<geometry_msgs::PoseArray>(names.threads + "poses", 100);
+    pubs_.thread_state = nh_.advertise<slender_sim::ThreadState>(names.threads + "state", 1000);
+    pubs_.thread_poses = nh_.advertise<geometry_msgs::PoseArray>(names.threads + "poses", 100);
   }
   if (names.has_cloths)
   {
-    cloth_state_pub_ = nh_.advertise<slender_sim::ClothState>(names.cloths + "state", 1000);
-    points_pub_ = nh_.advertise<sensor_msgs::PointCloud2>(names.cloths + "points", 100);
-    mesh_pub_ = nh_.advertise<slender_sim::MeshStamped>(names.cloths + "mesh", 1, true);
+    pubs_.cloth_state = nh_.advertise<slender_sim::ClothState>(names.cloths + "state", 1000);
+    pubs_.points = nh_.advertise<sensor_msgs::PointCloud2>(names.cloths + "points", 100);
+    pubs_.mesh = nh_.advertise<slender_sim::MeshStamped>(names.cloths + "mesh", 1, true);
   }
   for (const std::string& prefix : names.nozzles)
-    nozzle_pubs_.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
+    pubs_.nozzles.push_back(nh_.advertise<geometry_msgs::WrenchStamped>(prefix + "nozzle/wrench", 100));
   if (simulation_->config().rods.size() > 1)
     for (const RodConfig& rod : simulation_->config().rods)
-      rod_poses_pubs_.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
-  rod_poses_.resize(rod_poses_pubs_.size());
+      pubs_.each_rod_poses.push_back(nh_.advertise<geometry_msgs::PoseArray>("rods/" + rod.name + "/poses", 100));
+  rod_poses_.resize(pubs_.each_rod_poses.size());
   const std::string node = nh_priv_.getNamespace().substr(1);
   frames_ = std::make_unique<FrameBroadcaster>(nh_, node, options_.frame_id, names, graspsHaveFrames());
   wrenches_ = std::make_unique<GraspWrenches>(
@@ -196,22 +190,20 @@ void SceneNode::advertise()
                              options_.wrench_filter});
   const std::vector<BodyConfig>& bodies = simulation_->config().bodies;
   if (!bodies.empty())
-    bodies_pub_ = nh_.advertise<slender_sim::BodyStates>("body_states", 1000);
+    pubs_.bodies = nh_.advertise<slender_sim::BodyStates>("body_states", 1000);
   if (simulation_->grasps().size() > 0)
-    grasps_pub_ = nh_.advertise<slender_sim::GraspStates>("grasp_states", 1000);
+    pubs_.grasps = nh_.advertise<slender_sim::GraspStates>("grasp_states", 1000);
   if (!simulation_->config().obstacles.empty())
-    obstacles_pub_ = nh_.advertise<slender_sim::BodyStates>("obstacle_states", 1000);
+    pubs_.obstacles = nh_.advertise<slender_sim::BodyStates>("obstacle_states", 1000);
   if (!simulation_->config().record.fields.empty())
-    fields_pub_ = nh_.advertise<slender_sim::Fields>("fields", 1000);
+    pubs_.fields = nh_.advertise<slender_sim::Fields>("fields", 1000);
   broadcastFrame();
-  markers_pub_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
-  scene_pub_ = nh_.advertise<std_msgs::String>("scene", 1, true);
-  diagnostics_pub_ = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
+  pubs_.markers = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2);
+  pubs_.scene = nh_.advertise<std_msgs::String>("scene", 1, true);
+  pubs_.diagnostics = nh_.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10);
   if (options_.publish_clock)
-    clock_pub_ = nh_.advertise<rosgraph_msgs::Clock>("/clock", 100, true);
+    pubs_.clock = nh_.advertise<rosgraph_msgs::Clock>("/clock", 100, true);
 }
-
-bool SceneNode::isStateFinite() const { return allFinite(simulation_->state()); }
 
 bool SceneNode::advance()
 {
@@ -224,7 +216,6 @@ bool SceneNode::advance()
   if (!mindLimits(limits_->checkInputs(step_inputs_)))
     return false;
   const StepReport report = simulation_->step(step_inputs_);
-  last_report_ = report;
   if (!report.ok)
   {
     if (stepsInterrupted())   // by a signal, which shuts the node down: the state is that at the start of the step
@@ -232,7 +223,7 @@ bool SceneNode::advance()
     fail(std::string(toString(report.failure)) + ": " + report.message);
     return false;
   }
-  if (!isStateFinite())
+  if (!allFinite(simulation_->state()))
   {
     fail("the state is not finite any more");
     return false;
@@ -272,7 +263,7 @@ void SceneNode::publishClock()
     return;
   rosgraph_msgs::Clock message;
   message.clock = clock_.stamp();
-  clock_pub_.publish(message);
+  pubs_.clock.publish(message);
 }
 
 void SceneNode::publishState()
@@ -282,75 +273,71 @@ void SceneNode::publishState()
   if (!bag_ && !isHeard())
     return;
   messages_.fill(*simulation_, clock_.stamp(), options_.frame_id, epoch_);
-  if (fields_pub_ && (bag_ || fields_pub_.getNumSubscribers() > 0))
+  if (pubs_.fields && (bag_ || pubs_.fields.getNumSubscribers() > 0))
     messages_.fillFields(*simulation_);
   writeBag([this](BagRecorder& bag) { bag.record(messages_); });   // first: what is published belongs to others
   publishObjects();
-  for (std::size_t k = 0; k < nozzle_pubs_.size(); ++k)
-    nozzle_pubs_[k].publish(messages_.nozzles[k]);
+  for (std::size_t k = 0; k < pubs_.nozzles.size(); ++k)
+    pubs_.nozzles[k].publish(messages_.nozzles[k]);
   wrenches_->publish(messages_);
   if (!messages_.bodies.name.empty())
-    bodies_pub_.publish(messages_.bodies);
+    pubs_.bodies.publish(messages_.bodies);
   if (!messages_.grasps.name.empty())
-    grasps_pub_.publish(messages_.grasps);
+    pubs_.grasps.publish(messages_.grasps);
   if (!messages_.obstacles.name.empty())
-    obstacles_pub_.publish(messages_.obstacles);
-  if (fields_pub_.getNumSubscribers() > 0)
-    fields_pub_.publish(messages_.fields);
+    pubs_.obstacles.publish(messages_.obstacles);
+  if (pubs_.fields.getNumSubscribers() > 0)
+    pubs_.fields.publish(messages_.fields);
 }
 
 /// Returns true if a topic of publishState() has a subscriber.
 bool SceneNode::isHeard() const
 {
   const auto heard = [](const ros::Publisher& p) { return p.getNumSubscribers() > 0; };
-  return heard(rod_state_pub_) || heard(rod_poses_pub_) || heard(thread_state_pub_) || heard(thread_poses_pub_) ||
-         heard(cloth_state_pub_) || heard(points_pub_) || heard(bodies_pub_) || heard(grasps_pub_) ||
-         heard(obstacles_pub_) || heard(fields_pub_) ||
-         std::any_of(rod_poses_pubs_.begin(), rod_poses_pubs_.end(), heard) || wrenches_->isHeard() ||
-         std::any_of(nozzle_pubs_.begin(), nozzle_pubs_.end(), heard);
+  return heard(pubs_.rod_state) || heard(pubs_.rod_poses) || heard(pubs_.thread_state) || heard(pubs_.thread_poses) ||
+         heard(pubs_.cloth_state) || heard(pubs_.points) || heard(pubs_.bodies) || heard(pubs_.grasps) ||
+         heard(pubs_.obstacles) || heard(pubs_.fields) ||
+         std::any_of(pubs_.each_rod_poses.begin(), pubs_.each_rod_poses.end(), heard) || wrenches_->isHeard() ||
+         std::any_of(pubs_.nozzles.begin(), pubs_.nozzles.end(), heard);
 }
 
 /// Publishes rods, threads and cloths. Do not change the messages afterwards, because subscribers share them.
 void SceneNode::publishObjects()
 {
-  if (points_pub_.getNumSubscribers() > 0)
+  if (pubs_.points.getNumSubscribers() > 0)
   {
     sensor_msgs::PointCloud2& points = points_.renew();
     points.header = messages_.header;
     toPoints(*messages_.cloth_state, points);
-    points_pub_.publish(points_.pointer());
+    pubs_.points.publish(points_.pointer());
   }
-  for (std::size_t r = 0; r < rod_poses_pubs_.size(); ++r)
-    if (rod_poses_pubs_[r].getNumSubscribers() > 0)
+  for (std::size_t r = 0; r < pubs_.each_rod_poses.size(); ++r)
+    if (pubs_.each_rod_poses[r].getNumSubscribers() > 0)
     {
       geometry_msgs::PoseArray& poses = rod_poses_[r].renew();
       poses.header = messages_.header;
       poses.poses.clear();
       appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
-      rod_poses_pubs_[r].publish(rod_poses_[r].pointer());
+      pubs_.each_rod_poses[r].publish(rod_poses_[r].pointer());
     }
   for (const auto& state : messages_.states)
-    rod_state_pub_.publish(state.pointer());
+    pubs_.rod_state.publish(state.pointer());
   for (const auto& state : messages_.threads)
-    thread_state_pub_.publish(state.pointer());
+    pubs_.thread_state.publish(state.pointer());
   if (topics_->has_cloths)
-    cloth_state_pub_.publish(messages_.cloth_state.pointer());
+    pubs_.cloth_state.publish(messages_.cloth_state.pointer());
   if (topics_->has_rods)
-    rod_poses_pub_.publish(messages_.rod_poses.pointer());
+    pubs_.rod_poses.publish(messages_.rod_poses.pointer());
   if (topics_->has_threads)
-    thread_poses_pub_.publish(messages_.thread_poses.pointer());
+    pubs_.thread_poses.publish(messages_.thread_poses.pointer());
 }
 
 /// tf knows a frame only by a transform. Without any rviz warns that its fixed frame does not exist.
 void SceneNode::broadcastFrame()
 {
   frame_broadcaster_ = std::make_unique<tf2_ros::StaticTransformBroadcaster>();
-  geometry_msgs::TransformStamped transform;
-  transform.header.stamp = clock_.stamp();
-  transform.header.frame_id = options_.frame_id;
-  transform.child_frame_id = nh_priv_.getNamespace().substr(1) + "/origin";
-  transform.transform.rotation.w = 1.0;
-  frame_broadcaster_->sendTransform(transform);
+  frame_broadcaster_->sendTransform(toTransform(makeHeader(clock_.stamp(), options_.frame_id),
+                                                nh_priv_.getNamespace().substr(1) + "/origin", Pose()));
 }
 
 /// Returns true if grasps are published as tf frames. Many grasps have frames only if ~wrench_frame asks for them,
@@ -382,7 +369,7 @@ catch (const std::runtime_error& e)
 
 void SceneNode::publishMarkers()
 {
-  const std::uint32_t listeners = markers_pub_.getNumSubscribers();
+  const std::uint32_t listeners = pubs_.markers.getNumSubscribers();
   const auto now = std::make_pair(clock_.ticks(), listeners);
   if (listeners == 0)
     drawn_.reset();   // the next subscriber has no picture yet
@@ -390,13 +377,11 @@ void SceneNode::publishMarkers()
     return;
   next_markers_ = ros::WallTime::now() + ros::WallDuration(1.0 / options_.marker_rate);
   drawn_ = now;
-  std_msgs::Header header;
-  header.stamp = clock_.stamp();
-  header.frame_id = options_.frame_id;
+  const std_msgs::Header header = makeHeader(clock_.stamp(), options_.frame_id);
   options_.markers.note = paceNote();
   if (options_.markers.letters == 0.0)   // The letters keep their size, because the view does not grow with the scene.
     options_.markers.letters = legendLetters(*simulation_);
-  markers_pub_.publish(
+  pubs_.markers.publish(
       boost::make_shared<visualization_msgs::MarkerArray>(sceneMarkers(*simulation_, header, options_.markers)));
 }
 

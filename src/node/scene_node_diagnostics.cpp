@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <type_traits>
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
@@ -14,14 +15,6 @@ using diagnostic_msgs::DiagnosticStatus;
 
 constexpr double kBehind = 1.0;   // [s] /clock may lag behind the simulated time by a few resets' ticks
 
-void add(DiagnosticStatus& status, const std::string& key, const std::string& value)
-{
-  diagnostic_msgs::KeyValue entry;
-  entry.key = key;
-  entry.value = value;
-  status.values.push_back(entry);
-}
-
 std::string text(const char* format, double value)
 {
   char out[128];
@@ -29,11 +22,19 @@ std::string text(const char* format, double value)
   return out;
 }
 
-void add(DiagnosticStatus& status, const std::string& key, double value) { add(status, key, text("%.6g", value)); }
-
-void add(DiagnosticStatus& status, const std::string& key, std::uint64_t value)
+/// `value`: a text or a number.
+template <class Value>
+void add(DiagnosticStatus& status, const std::string& key, const Value& value)
 {
-  add(status, key, std::to_string(value));
+  diagnostic_msgs::KeyValue entry;
+  entry.key = key;
+  if constexpr (std::is_integral_v<Value>)
+    entry.value = std::to_string(value);
+  else if constexpr (std::is_floating_point_v<Value>)
+    entry.value = text("%.6g", value);
+  else
+    entry.value = value;
+  status.values.push_back(entry);
 }
 
 void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& message)
@@ -90,8 +91,8 @@ void addStart(const Simulation& simulation, DiagnosticStatus& status)
     add(status, "start: residual", start->residual);
     add(status, "start: energy [J]", start->energy);
     add(status, "start: lowest eigenvalue [1/s^2]", start->lowest_eigenvalue);
-    add(status, "start: stable", std::string(start->stable ? "yes" : "no"));
-    add(status, "start: unstable equilibria left", static_cast<std::uint64_t>(start->escapes));
+    add(status, "start: stable", start->stable ? "yes" : "no");
+    add(status, "start: unstable equilibria left", start->escapes);
     if (!start->stable)
       raise(status, DiagnosticStatus::WARN, "the run started from an unstable equilibrium");
   }
@@ -125,7 +126,7 @@ void addTracking(const Simulation& simulation, const RunStatistics& recent, Diag
   if (std::any_of(cloths.begin(), cloths.end(),
                   [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0; }))
   {
-    add(status, "most guide forces at their bounds", static_cast<std::uint64_t>(recent.forces_at_bound));
+    add(status, "most guide forces at their bounds", recent.forces_at_bound);
     add(status, "greatest distance where forces are at their bounds [m]", refused);
   }
 }
@@ -163,7 +164,7 @@ void SceneNode::publishDiagnostics()
   diagnostic_msgs::DiagnosticArray message;
   message.header.stamp = clock_.stamp();
   message.status = {simulationStatus(), inputStatus()};
-  diagnostics_pub_.publish(message);
+  pubs_.diagnostics.publish(message);
   if (const std::string waits = clockWentBack(); !waits.empty() && ros::WallTime::now() >= next_clock_reminder_)
   {
     next_clock_reminder_ = ros::WallTime::now() + ros::WallDuration(kClockReminder);
@@ -252,8 +253,8 @@ void SceneNode::addLimits(DiagnosticStatus& status) const
     report(DiagnosticStatus::WARN, inside.front());
   for (const std::string& pair : inside)
     add(status, "held inside", pair);
-  add(status, "limits exceeded now", std::uint64_t{lasting.size()});
-  add(status, "limits exceeded so far", std::to_string(limits_->count()));
+  add(status, "limits exceeded now", lasting.size());
+  add(status, "limits exceeded so far", limits_->count());
   if (!lasting.empty())
     add(status, "last limit exceeded", lasting.back());
 }
@@ -284,7 +285,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
   if (status.message.empty())
     status.message = mode_ == Mode::paused ? "paused" : running ? "running" : "waiting for ~step";
 
-  add(status, "epoch", std::uint64_t{epoch_});
+  add(status, "epoch", epoch_);
   add(status, "step", simulation_->state().steps);
   add(status, "simulated time [s]", simulation_->state().time);
   add(status, "mean step time [ms]", recent_.steps ? 1e3 * recent_.busy / static_cast<double>(recent_.steps) : 0.0);
@@ -308,7 +309,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
     addThreads(*simulation_, recent_, status);
   if (recent_.projection_iterations > 0)
   {
-    add(status, "projection iterations", static_cast<std::uint64_t>(recent_.projection_iterations));
+    add(status, "projection iterations", recent_.projection_iterations);
     add(status, "constraint error", recent_.constraint_error);
   }
   if (tracksGuide(simulation_->config().cloths) || tracksGuide(simulation_->config().rods))
@@ -332,7 +333,7 @@ DiagnosticStatus SceneNode::inputStatus()
     if (age.seconds)
       add(status, "input age " + age.name + " [s]", *age.seconds);
     else
-      add(status, "input age " + age.name + " [s]", std::string("none yet"));
+      add(status, "input age " + age.name + " [s]", "none yet");
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
     if (age.seconds)

@@ -6,6 +6,7 @@
 
 #include <std_msgs/String.h>
 
+#include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_markers.h"
 #include "slender_sim/node/scene_node.h"
 
@@ -124,13 +125,13 @@ void SceneNode::takeUp(EditedScene edited)
   crossings_ = std::make_unique<CrossingWatch>(*simulation_);
   makeInputs();
   {
-    const std::vector<ros::Publisher> before = takePublishers();
+    const Publishers before = std::exchange(pubs_, Publishers());
     advertise();
   }
   wrenches_->takeOver(*wrenches_before);
   std_msgs::String scene;
   scene.data = simulation_->config().source;
-  scene_pub_.publish(scene);
+  pubs_.scene.publish(scene);
   writeBag([&](BagRecorder& bag) {
     bag.sceneChanged(*simulation_);
     bag.recordScene(scene.data, clock_.stamp());
@@ -142,31 +143,12 @@ void SceneNode::takeUp(EditedScene edited)
   drawn_.reset();
 }
 
-/// Moves all publishers that advertise() makes out of the node.
-std::vector<ros::Publisher> SceneNode::takePublishers()
-{
-  std::vector<ros::Publisher> taken;
-  for (ros::Publisher* publisher :
-       {&bodies_pub_, &grasps_pub_, &obstacles_pub_, &fields_pub_, &rod_state_pub_, &rod_poses_pub_, &thread_state_pub_,
-        &thread_poses_pub_, &cloth_state_pub_, &points_pub_, &mesh_pub_, &markers_pub_, &scene_pub_, &diagnostics_pub_,
-        &clock_pub_})
-    taken.push_back(std::exchange(*publisher, ros::Publisher()));
-  for (std::vector<ros::Publisher>* publishers : {&rod_poses_pubs_, &nozzle_pubs_})
-  {
-    taken.insert(taken.end(), publishers->begin(), publishers->end());
-    publishers->clear();
-  }
-  return taken;
-}
-
 /// Deletes the markers of objects that the edit removed.
 void SceneNode::deleteMarkers(const Simulation& before)
 {
-  if (markers_pub_.getNumSubscribers() == 0)
+  if (pubs_.markers.getNumSubscribers() == 0)
     return;
-  std_msgs::Header header;
-  header.stamp = clock_.stamp();
-  header.frame_id = options_.frame_id;
+  const std_msgs::Header header = makeHeader(clock_.stamp(), options_.frame_id);
   using Id = std::pair<std::string, int>;
   std::set<Id> now;
   for (const visualization_msgs::Marker& marker : sceneMarkers(*simulation_, header, options_.markers).markers)
@@ -183,7 +165,7 @@ void SceneNode::deleteMarkers(const Simulation& before)
     gone.markers.back().action = visualization_msgs::Marker::DELETE;
   }
   if (!gone.markers.empty())
-    markers_pub_.publish(gone);
+    pubs_.markers.publish(gone);
 }
 
 void SceneNode::repeatEdit(const Input& input)

@@ -1,6 +1,5 @@
 // What changes a run from outside: recorded beside its states, and repeated from such a record.
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <unistd.h>
@@ -104,16 +103,20 @@ void SceneNode::note(Input input, std::uint64_t tick)
         makeInput(Input::SETTINGS, {options_.guide_delay, options_.guide_delay_auto ? 1.0 : 0.0,
                                     options_.live_guides ? 1.0 : 0.0, options_.catch_up_time, options_.catch_up_speed}),
         tick);
-  input.header.stamp = clock_.stamp();
-  input.header.frame_id = options_.frame_id;
+  input.header = makeHeader(clock_.stamp(), options_.frame_id);
   input.number = inputs_noted_++;
   input.tick = tick;
   writeBag([&input](BagRecorder& bag) { bag.recordInput(input); });
 }
 
-void SceneNode::noteJump(Input input, std::uint64_t tick, std::uint64_t skipped, bool failed)
+void SceneNode::goOnAfter(Input input, Mode mode)
 {
-  input.values = {static_cast<double>(skipped), failed ? 1.0 : 0.0};
+  const bool failed = mode_ == Mode::failed;
+  if (failed)
+    mode_ = mode;
+  failure_.clear();
+  const std::uint64_t tick = clock_.ticks();
+  input.values = {static_cast<double>(jumped()), failed && guides_led_on_ ? 1.0 : 0.0};
   note(std::move(input), tick);
 }
 

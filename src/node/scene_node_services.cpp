@@ -77,13 +77,7 @@ bool SceneNode::onReset(std_srvs::Trigger::Request&, std_srvs::Trigger::Response
     return true;
   }
   inputs_->restart(*simulation_);
-  const bool failed = mode_ == Mode::failed;
-  if (failed)
-    mode_ = mode_before_failure_;
-  failure_.clear();
-  last_report_ = StepReport();
-  const std::uint64_t tick = clock_.ticks(), skipped = jumped();
-  noteJump(makeInput(slender_sim::Input::RESET), tick, skipped, failed && guides_led_on_);
+  goOnAfter(makeInput(slender_sim::Input::RESET), mode_before_failure_);
   publishState();
   inputs_since_ = clock_.seconds();
   publishDiagnostics();
@@ -331,13 +325,8 @@ bool SceneNode::onLoad(slender_sim::FilePath::Request& request, slender_sim::Fil
     return true;
   }
   inputs_->attachAll(*simulation_);
-  const bool failed = mode_ == Mode::failed;
-  if (failed)
-    mode_ = Mode::paused;   // what was loaded may be just before the failure
-  failure_.clear();
-  const std::uint64_t tick = clock_.ticks(), skipped = jumped();
-  noteJump(std::move(input), tick, skipped, failed && guides_led_on_);
-  inputs_->takeKept(true);   // the clock is at the present
+  goOnAfter(std::move(input), Mode::paused);   // what was loaded may be just before the failure
+  inputs_->takeKept(true);                     // the clock is at the present
   publishState();
   response.success = true;
   response.message = "loaded " + path;

@@ -20,16 +20,14 @@ void StepGaps::add(std::uint32_t epoch, std::uint64_t step, double seconds)
   {
     const std::uint64_t stride = step - last_->step;
     const double time = seconds - last_->seconds;
-    Stride& same = strides_[stride];
-    if (same.count++ == 0)
-      same.first = last_->seconds;
-    const auto [pace, first] = paces_.try_emplace(stride, Pace{time, time, last_->seconds});
-    if (time > pace->second.most)
+    Stride& same = strides_.try_emplace(stride, Stride{0, last_->seconds, time, time, last_->seconds}).first->second;
+    ++same.count;
+    if (time > same.most)
     {
-      pace->second.most = time;
-      pace->second.most_at = last_->seconds;
+      same.most = time;
+      same.most_at = last_->seconds;
     }
-    pace->second.least = std::min(pace->second.least, time);
+    same.least = std::min(same.least, time);
   }
   last_ = Instant{epoch, step, seconds};
 }
@@ -53,7 +51,7 @@ std::string StepGaps::text(double step_length) const
     out = std::to_string(lost) + " recorded instants are missing in " + std::to_string(places) +
           " places, first after " + number(first) + " s; a node's own bag (~record_bag) lacks none. ";
   double skipped = 0.0, at = 0.0;
-  for (const auto& [stride, pace] : paces_)
+  for (const auto& [stride, pace] : strides_)
   {
     const double expected = step_length > 0.0 ? step_length * static_cast<double>(stride) : pace.least;
     const double extra = pace.most - expected;

@@ -302,21 +302,16 @@ bool TrackingInputs::Guide::heard() const
 std::vector<TrackingInputs::Age> TrackingInputs::ages() const
 {
   std::vector<Age> ages;
-  const auto age = [this](const std::optional<double>& last) {
-    return last ? std::optional<double>(clock_.seconds() - *last) : std::nullopt;
-  };
   for (const Guide& guide : guides_)
   {
     if (guide.points)
-      ages.push_back({guide.topic, age(guide.points->lastTime()), false, guide.points->timing().lag(),
-                      guide.points->timing().excess(), guide.points->timing().interval()});
+      ages.push_back(ageOf(guide.topic, *guide.points, clock_.seconds()));
     for (std::size_t b = 0; b < guide.bodies.size(); ++b)   // one may fall silent while others speak
     {
-      const std::optional<double> own = age(guide.bodies[b].lastTime());
       const std::string& body = guide.carried->bodies[b];
-      ages.push_back({guide.topic + (guide.carried->by_tf ? " (tf " + body + ")" : " " + body), own,
-                      !own && guide.heard(), guide.bodies[b].timing().lag(), guide.bodies[b].timing().excess(),
-                      guide.bodies[b].timing().interval()});
+      ages.push_back(ageOf(guide.topic + (guide.carried->by_tf ? " (tf " + body + ")" : " " + body), guide.bodies[b],
+                           clock_.seconds()));
+      ages.back().missing = !ages.back().seconds && guide.heard();
     }
   }
   return ages;

@@ -4,7 +4,7 @@
 
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/PoseArray.h>
-#include <geometry_msgs/Transform.h>
+#include <geometry_msgs/TransformStamped.h>
 #include <geometry_msgs/Twist.h>
 #include <geometry_msgs/Wrench.h>
 #include <sensor_msgs/PointCloud2.h>
@@ -15,7 +15,6 @@
 #include "slender_sim/RodState.h"
 #include "slender_sim/ThreadState.h"
 #include "slender_sim/cloth/cloth_model.h"
-#include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/rod/rod_stepper.h"
 #include "slender_sim/scene/snapshot.h"
@@ -30,6 +29,8 @@ geometry_msgs::Quaternion toQuaternion(const Eigen::Quaterniond& q);
 geometry_msgs::Pose toMessage(const Pose& X);
 geometry_msgs::Wrench toMessage(const Wrench& wrench);
 geometry_msgs::Twist toMessage(const Twist& twist);
+std_msgs::Header makeHeader(const ros::Time& stamp, const std::string& frame_id);
+geometry_msgs::TransformStamped toTransform(const std_msgs::Header& header, const std::string& child, const Pose& X);
 
 Eigen::Vector3d fromMessage(const geometry_msgs::Point& p);
 Eigen::Vector3d fromMessage(const geometry_msgs::Vector3& v);

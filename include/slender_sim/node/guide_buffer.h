@@ -23,20 +23,11 @@ namespace slender {
 class GuideBuffer : public GuideStream<PoseTrajectory>
 {
 public:
-  struct Options
+  struct Options : GuideTiming::Options
   {
-    /// [s] >= 0. Two sample intervals plus the transport time are enough. With less, the grasp lags by what the samples
-    /// need. With 0 there is no lag, and the velocity jumps.
-    double delay = 0.05;
     double catch_up_time = 0.1;      ///< [s] > 0, shortest blending time
     double catch_up_speed = 1.0;     ///< [m/s] > 0, mean speed of catching up
     double catch_up_turning = 3.0;   ///< [rad/s] > 0, mean speed of catching up in orientation
-    /// [s] >= 0 in which the motion comes to rest when no sample comes; 0: the last sample is held
-    double coast = 0.0;
-    bool automatic = false;   ///< the lag is the one that the samples need, see GuideTiming
-    bool live = false;        ///< samples come in real time, see GuideTiming
-
-    GuideTiming::Options timing() const { return {delay, automatic, live, coast}; }
   };
 
   /// `X_WG` is the present pose of the grasp in the world. With Attach::section samples are poses of the held section.

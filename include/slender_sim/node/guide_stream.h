@@ -33,12 +33,11 @@ public:
   }
 
 protected:
-  /// `coast` [s] >= 0: within this time the motion comes to rest when no sample comes. With 0 the last sample is held.
   /// `blend` [s] > 0: shortest time in which an offset fades, from rest to the speed of a stream, or back. If the
   /// interval of the samples is shorter, streams may begin and end in motion. Otherwise they begin and end at rest.
-  GuideStream(const GuideTiming::Options& timing, double coast, double blend)
+  GuideStream(const GuideTiming::Options& timing, double blend)
     : timing_(timing),
-      coast_(coast),
+      coast_(timing.coast),
       blend_(blend),
       cut_(timing.delay > 0.0 || timing.automatic ? blend : 0.0)   // without a lag each new sample is an end at first
   {

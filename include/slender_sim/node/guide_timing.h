@@ -26,13 +26,13 @@ class GuideTiming
 public:
   struct Options
   {
-    /// [s] >= 0, the lag while samples come in time. With 0 there is never a lag, and late samples cause jumps of
-    /// velocity.
+    /// [s] >= 0, the lag while samples come in time. Two sample intervals plus the transport time are enough. With less
+    /// the lag grows to what the samples need. With 0 there is never a lag, and late samples cause jumps of velocity.
     double delay = 0.05;
     bool automatic = false;   ///< the lag is the needed one; `delay` is used until the needed lag is known
     bool live = false;        ///< samples come in real time, so a missing sample may still come
-    /// [s] >= 0 for which the caller moves on after the last sample. With more than 0 the rate does not fall when
-    /// samples are missing.
+    /// [s] >= 0 for which the caller moves on after the last sample, until the motion is at rest. With more than 0 the
+    /// rate does not fall when samples are missing. With 0 the last sample is held.
     double coast = 0.0;
   };
 

@@ -72,7 +72,6 @@ private:
   void makeInputs();   // called again for an edited scene
   void advertise();
   void publishMesh();
-  bool isStateFinite() const;
   bool ended() const { return !nh_.ok() || finished_ || stop_; }
   bool advance();   // one step with everything it publishes; false when it failed
   void fail(const std::string& reason);
@@ -119,7 +118,8 @@ private:
   void takeRecordedScene();
   std::string leftover(const std::string& parameter) const;   // advice if an earlier start may have set the parameter
   void note(slender_sim::Input input, std::uint64_t tick);
-  void noteJump(slender_sim::Input input, std::uint64_t tick, std::uint64_t skipped, bool failed);
+  // Goes on after the state was replaced by `input`; a node that had failed goes on in `mode`.
+  void goOnAfter(slender_sim::Input input, Mode mode);
   void noteGrasp(const slender_sim::SetGrasp::Request& request, const std::string& why = "");
   bool replayInputs();   // repeats the inputs of the present tick; returns false when the run is over
   void repeat(const slender_sim::Input& input);
@@ -153,7 +153,6 @@ private:
               slender_sim::EditScene::Response& response);
   EditedScene edited(const SceneEdit& edit) const;   // throws if the edit is refused
   void takeUp(EditedScene edited);
-  std::vector<ros::Publisher> takePublishers();
   void deleteMarkers(const Simulation& before);
   void repeatEdit(const slender_sim::Input& input);
 
@@ -186,7 +185,7 @@ private:
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
   SharedMessage<sensor_msgs::PointCloud2> points_;
-  std::vector<SharedMessage<geometry_msgs::PoseArray>> rod_poses_;   // as rod_poses_pubs_
+  std::vector<SharedMessage<geometry_msgs::PoseArray>> rod_poses_;   // as pubs_.each_rod_poses
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
@@ -197,7 +196,6 @@ private:
   std::atomic<bool> stop_{false};
   std::uint32_t epoch_ = 0;
   std::string failure_, bag_failure_;
-  StepReport last_report_;
   double shown_pace_ = 0.0;        // simulated time over wall time between the last two diagnostics; 0: not known
   RunStatistics total_, recent_;   // since the start, since the last diagnostics
   std::uint64_t reported_drops_ = 0, limits_silent_ = 0;   // limits_silent_: excursions since the last warning
@@ -209,14 +207,19 @@ private:
   ros::WallTime next_diagnostics_, next_markers_, next_clock_reminder_, next_input_reminder_;
   std::optional<std::pair<std::uint64_t, std::uint32_t>> drawn_;   // tick, subscribers of the last picture
 
-  ros::Publisher bodies_pub_, grasps_pub_, obstacles_pub_, fields_pub_;   // only if the scene has such objects
   std::unique_ptr<FrameBroadcaster> frames_;
   std::unique_ptr<GraspWrenches> wrenches_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // makes ~frame_id known to rviz
-  ros::Publisher rod_state_pub_, rod_poses_pub_, thread_state_pub_, thread_poses_pub_;   // only of kinds in the scene
-  ros::Publisher cloth_state_pub_, points_pub_, mesh_pub_;                               // only if the scene has cloths
-  ros::Publisher markers_pub_, scene_pub_, diagnostics_pub_, clock_pub_;
-  std::vector<ros::Publisher> rod_poses_pubs_, nozzle_pubs_;
+  // all that advertise() makes
+  struct Publishers
+  {
+    ros::Publisher bodies, grasps, obstacles, fields;                  // only if the scene has such objects
+    ros::Publisher rod_state, rod_poses, thread_state, thread_poses;   // only of kinds in the scene
+    ros::Publisher cloth_state, points, mesh;                          // only if the scene has cloths
+    ros::Publisher markers, scene, diagnostics, clock;
+    std::vector<ros::Publisher> each_rod_poses, nozzles;
+  };
+  Publishers pubs_;
   std::vector<ros::ServiceServer> services_;
 };
 

@@ -25,19 +25,14 @@ private:
     std::uint64_t step;
     double seconds;
   };
+  // how often instants are so many steps apart, and when first; shortest and longest time, and when that began [s]
   struct Stride
   {
     std::uint64_t count = 0;
-    double first = 0.0;
-  };   // how often so many steps apart, and when first
-  // [s] per stride: shortest and longest time, and when that began
-  struct Pace
-  {
-    double least = 0.0, most = 0.0, most_at = 0.0;
+    double first, least, most, most_at;
   };
   std::optional<Instant> last_;
   std::map<std::uint64_t, Stride> strides_;
-  std::map<std::uint64_t, Pace> paces_;
 };
 
 /// The same for messages without step numbers: intervals that are much longer than the usual one.

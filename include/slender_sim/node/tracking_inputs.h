@@ -74,6 +74,19 @@ public:
     /// once are not late.
     double late() const { return excess - 2.0 * interval; }
   };
+  /// `buffer`: that of the input. `now`: time of the clock [s].
+  template <class Buffer>
+  static Age ageOf(const std::string& name, const Buffer& buffer, double now)
+  {
+    const std::optional<double> last = buffer.lastTime();
+    const GuideTiming& timing = buffer.timing();
+    return {name,
+            last ? std::optional(now - *last) : std::nullopt,
+            false,
+            timing.lag(),
+            timing.excess(),
+            timing.interval()};
+  }
   std::vector<Age> ages() const;
 
 private:
