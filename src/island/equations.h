@@ -61,7 +61,7 @@ public:
   void setContact(ContactSurface surface, const ContactOptions& options);
   /// A potential of the surface points besides contact; null: none.
   void setAttraction(SurfacePotential* attraction) { attraction_ = attraction; }
-  /// Threads that evaluate parts and contact; 0: as OpenMP says.
+  /// Threads that evaluate parts and contact, and that factor the shared matrix; 0: as OpenMP says.
   void setThreads(int threads);
   ContactPotential* contact() { return contact_.get(); }   ///< null: nothing touches
   const ContactPotential* contact() const { return contact_.get(); }

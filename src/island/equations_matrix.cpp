@@ -1,6 +1,7 @@
 // Several parts and their contact as one system for Newton's method: forces, the shared matrix, and its solution.
 #include <algorithm>
 #include <iterator>
+#include <limits>
 
 #include "island/equations_loops.h"
 
@@ -396,8 +397,10 @@ void Equations::solve()
   if (!solved)
   {
     assemble(shift_, false);   // without what may be negative
-    matrix_.factorDirectly();
-    matrix_.solve();
+    if (matrix_.factorDirectly())
+      matrix_.solve();
+    else   // There is no direction, so that the step fails.
+      std::fill_n(matrix_.solution(), matrix_.unknowns(), std::numeric_limits<double>::quiet_NaN());
   }
   if (anyAverages())
     keepAverages();

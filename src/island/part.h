@@ -139,7 +139,9 @@ public:
 
   // ---- the matrix of the island, of a coupled part
   virtual void notePattern(SharedMatrix& matrix) = 0;   ///< Notes what the part itself couples.
-  virtual void findEntries(const SharedMatrix&) {}      ///< Is called when the pattern is finished.
+  /// Is called when the pattern is finished, for several parts at the same time.
+  virtual void findEntries(const SharedMatrix&) {}
+  /// Is called for several parts at the same time. Unless it is joined(), a part adds to entries of its own unknowns.
   virtual void addHessian(SharedMatrix& matrix, const HessianShift& shift) = 0;
   virtual void takeGradient(double* right) const = 0;       ///< right-hand side := minus its gradient
   virtual void takeDirection(const double* solution) = 0;   ///< direction := its part of the solution

@@ -159,9 +159,9 @@ void SharedMatrix::takeBlocks(const std::vector<int>& blocks)
   }
   if (starts != block_starts_ || rows != block_rows_)
   {
+    block_cholesky_.setPattern(starts, rows);
     block_starts_ = std::move(starts);
     block_rows_ = std::move(rows);
-    block_cholesky_.setPattern(block_starts_, block_rows_);
   }
   gradients_.resize(static_cast<std::size_t>(unknowns_));
   x_.resize(static_cast<std::size_t>(unknowns_));

@@ -66,7 +66,7 @@ public:
 
   /// `simplicial`: see SparseCholesky.
   explicit SharedMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
-  void setThreads(int threads) { threads_ = threads; }   ///< of factorisations; see parallelFor()
+  void setThreads(int threads) { threads_ = threads; }   ///< of factorisations and solutions with them
 
   // ---- pattern
   void begin(int unknowns);

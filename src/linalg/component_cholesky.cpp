@@ -7,11 +7,6 @@
 
 namespace slender {
 
-bool ComponentCholesky::haveSamePattern(const Component& a, const Component& b)
-{
-  return a.hash == b.hash && a.starts == b.starts && a.rows == b.rows;
-}
-
 /// Numbers the components in the order of their first unknowns.
 void ComponentCholesky::findComponents(const std::vector<int>& starts, const std::vector<int>& rows)
 {
@@ -37,7 +32,7 @@ void ComponentCholesky::findComponents(const std::vector<int>& starts, const std
     if (before[u] == u)
     {
       component_of_[u] = static_cast<int>(components_.size());
-      components_.emplace_back().starts.push_back(0);
+      components_.emplace_back();
     }
     else
       component_of_[u] = component_of_[before[u]];
@@ -47,27 +42,35 @@ void ComponentCholesky::findComponents(const std::vector<int>& starts, const std
   }
 }
 
-void ComponentCholesky::analyse(Component& component, std::vector<Component>& known) const
+void ComponentCholesky::analyse(Component& component)
 {
-  const auto same = std::find_if(known.begin(), known.end(),
-                                 [&](const Component& other) { return haveSamePattern(component, other); });
-  if (same == known.end())
+  const auto [first, end] = known_.equal_range(component.hash);
+  const auto same = std::find_if(first, end, [&](const auto& known) {
+    return known.second.starts == component.starts && known.second.rows == component.rows;
+  });
+  if (same != end)
   {
-    component.cholesky.emplace(simplicial_);
-    component.cholesky->setPattern(static_cast<int>(component.unknowns.size()), component.starts, component.rows);
+    component.cholesky = std::move(same->second.cholesky);
+    known_.erase(same);
     return;
   }
-  component.cholesky = std::move(same->cholesky);
-  known.erase(same);
+  component.cholesky.emplace(simplicial_);
+  component.cholesky->setPattern(static_cast<int>(component.unknowns.size()), component.starts, component.rows);
 }
 
 void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::vector<int>& rows)
 {
-  constexpr std::uint64_t kPrime = 0x100000001b3;   // of FNV-1a
-  std::vector<Component> known;
-  known.swap(components_);
+  constexpr std::uint64_t kBasis = 0xcbf29ce484222325, kPrime = 0x100000001b3;   // of FNV-1a, here of whole numbers
+  for (Component& component : components_)
+    known_.emplace(component.hash, std::move(component));
   findComponents(starts, rows);
   const auto mix = [](Component& component, int number) { component.hash = (component.hash ^ number) * kPrime; };
+  for (Component& component : components_)
+  {
+    component.hash = kBasis;
+    component.starts.push_back(0);
+    component.x.resize(component.unknowns.size());
+  }
   for (std::size_t u = 0; u < component_of_.size(); ++u)
   {
     Component& component = components_[component_of_[u]];
@@ -81,10 +84,8 @@ void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::ve
     mix(component, component.starts.back());
   }
   for (Component& component : components_)
-  {
-    component.x.resize(component.unknowns.size());
-    analyse(component, known);
-  }
+    analyse(component);
+  known_.clear();
 }
 
 bool ComponentCholesky::factor(const std::vector<double>& values, int threads)

@@ -2,15 +2,17 @@
 
 #include <cstdint>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
 
-/// Cholesky factorisation of a sparse symmetric matrix by its components: sets of unknowns that no entry couples. Each
-/// has its own factor. A component whose pattern has been there before keeps its analysis, so that only what couples
-/// anew is analysed when contacts come and go. Several threads factor and solve several components.
+/// Cholesky factorisation of a sparse symmetric matrix by its components: sets of unknowns such that no entry couples
+/// two sets. Each has its own factor. If its pattern equals that of a component of the previous matrix, it takes over
+/// the analysis, which changes no result, so that only what couples anew is analysed when contacts come and go. Several
+/// threads factor and solve several components.
 class ComponentCholesky
 {
 public:
@@ -35,12 +37,12 @@ private:
     bool definite = false;
     std::optional<SparseCholesky> cholesky;
   };
-  static bool haveSamePattern(const Component& a, const Component& b);
   void findComponents(const std::vector<int>& starts, const std::vector<int>& rows);
-  void analyse(Component& component, std::vector<Component>& known) const;
+  void analyse(Component& component);
 
   const bool simplicial_;
   std::vector<Component> components_;
+  std::unordered_multimap<std::uint64_t, Component> known_;   ///< those of the previous pattern, by their hashes
   std::vector<int> component_of_, number_;   ///< of unknowns: their components, and their numbers there
 };
 

@@ -7,7 +7,7 @@
 namespace slender {
 
 /// Calls f(k) for 0 <= k < count, in any order, on this many threads. If `threads` is 0, OpenMP chooses their number.
-/// A thread takes `chunk` numbers at a time. f must not throw.
+/// A thread takes `chunk` numbers at a time. f must not throw: the process would end, also where memory runs out.
 template <class F>
 void parallelFor(int threads, int count, [[maybe_unused]] int chunk, F&& f)
 {

@@ -131,8 +131,8 @@ void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<i
   m.takeOrder();
 }
 
-/// Keeps the matrix in the order of elimination: its lower triangle for supernodes, else its upper one. From these the
-/// factor follows without copies. CHOLMOD would make two of them in each factorisation.
+/// Keeps the matrix in the order of elimination: its lower triangle for supernodes, and else its upper triangle, whose
+/// columns CHOLMOD reads one by one. Otherwise CHOLMOD would make a permuted copy in each factorisation.
 void SparseCholesky::Impl::takeOrder()
 {
   const int n = static_cast<int>(starts.size()) - 1;
@@ -158,6 +158,7 @@ void SparseCholesky::Impl::takeOrder()
     }
   permuted_values.resize(rows.size());
   permuted_right.resize(n);
+  rows = {};                            // is in permuted_rows
   factor->ordering = CHOLMOD_NATURAL;   // of the permuted matrix
   std::iota(static_cast<int*>(factor->Perm), static_cast<int*>(factor->Perm) + n, 0);
   if (!lower)

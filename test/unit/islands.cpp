@@ -225,6 +225,41 @@ TEST(IslandScheduler, IslandsDoNotDependOnTheNumberOfThreads)
   }
 }
 
+/// A layer of rods along y that lands on one along x, which lies on the floor: one island that is large enough for
+/// threads of its own.
+std::string twoLayersOfRods()
+{
+  std::string scene =
+      "name: layers\ntime: {step: 0.002, duration: 1, integrator: implicit_euler}\n"
+      "obstacles: [{name: floor, shape: {plane: {}}}]\nrods:\n";
+  for (int k = 0; k < 40; ++k)
+  {
+    const std::string at = std::to_string(0.01 * (k / 2) + 0.005);
+    const auto point = [&](const char* along) {
+      return k % 2 == 0 ? std::string("[") + along + ", " + at + ", 0.0011]" : "[" + at + ", " + along + ", 0.0034]";
+    };
+    scene += "  - {name: rod" + std::to_string(k) + ", centerline: {straight: {from: " + point("0") +
+             ", to: " + point("0.2") + ", edges: 100}}, cross_section: {radius: 0.001}, material: {density: 1100, " +
+             "youngs_modulus: 1.0e6, poissons_ratio: 0.3}, contact: {friction: 0.3}}\n";
+  }
+  return scene;
+}
+
+TEST(IslandScheduler, ALargeIslandDoesNotDependOnTheNumberOfThreads)
+{
+  Simulation one(parseScene(twoLayersOfRods(), "one")), many(parseScene(twoLayersOfRods(), "many"));
+  one.setThreads(1);
+  many.setThreads(3);
+  for (int k = 0; k < 12; ++k)   // the upper layer lands after about eight steps
+  {
+    ASSERT_TRUE(one.step(one.defaultInputs()).ok);
+    ASSERT_TRUE(many.step(many.defaultInputs()).ok);
+  }
+  EXPECT_GE(one.world().contacts().size(), 100u);
+  for (std::size_t r = 0; r < 40; ++r)
+    EXPECT_EQ(one.state().rods[r].x, many.state().rods[r].x) << r;
+}
+
 #ifdef SLENDER_COUNTS_ALLOCATIONS
 TEST(IslandScheduler, WarmIslandsTakeNoMemory)
 {
