@@ -44,7 +44,7 @@ TimeConfig readTime(const YamlCursor& at)
               {"cholesky", IslandSolver::cholesky},
               {"conjugate_gradients", IslandSolver::conjugate_gradients}},
              "Solver of the linear equations of objects that touch or are joined. Without the key, or with auto, it is "
-             "chosen by their kinds and number, and by the number of contacts.");
+             "chosen by their kinds.");
   return time;
 }
 

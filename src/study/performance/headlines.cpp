@@ -30,7 +30,7 @@ const HeadlineRegistration kScaling{{
      "",
      "Long rods need no more iterations than short ones."},
     {"island_solvers",
-     "time of a step of a pile of rods with the solver chosen by size, over the better of the two",
+     "time of a step of a pile of rods with the solver that auto takes, over the better of the two",
      {{"worst_time_of_the_choice"}},
      kNumber,
      "1: always the better one",
