@@ -72,7 +72,7 @@ void GridPairs::fillBuckets(const std::vector<BoundingBox>& boxes, double invers
     ++bucket_start_[bucketOf(e.cell, buckets - 1)];
   std::partial_sum(bucket_start_.begin(), bucket_start_.end(), bucket_start_.begin());
   sorted_.resize(entries_.size());
-  for (auto e = entries_.rbegin(); e != entries_.rend(); ++e)   // from the end of each bucket to its start
+  for (auto e = entries_.rbegin(); e != entries_.rend(); ++e)   // Each bucket is filled from its end to its start.
     sorted_[--bucket_start_[bucketOf(e->cell, buckets - 1)]] = *e;
 }
 
@@ -100,7 +100,7 @@ void GridPairs::search(const std::vector<BoundingBox>& boxes, double inverse_siz
 
 const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBox>& boxes, int threads)
 {
-  constexpr unsigned kShare = 1 << 13;   // buckets that a thread searches at a time
+  constexpr unsigned kShare = 1 << 13;   // A thread searches so many buckets at a time.
   pairs_.clear();
   if (boxes.size() < 2)
     return pairs_;

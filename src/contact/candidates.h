@@ -23,7 +23,7 @@ public:
   {
     double gap, margin;   ///< [m]
     double turn;          ///< [rad]
-    int threads;          ///< see parallelFor()
+    int threads;          ///< that search for pairs; see parallelFor()
   };
 
   /// Finds all pairs that may come within the gap of each other while all points are at one instant of the motion, but

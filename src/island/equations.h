@@ -61,7 +61,7 @@ public:
   void setContact(ContactSurface surface, const ContactOptions& options);
   /// A potential of the surface points besides contact; null: none.
   void setAttraction(SurfacePotential* attraction) { attraction_ = attraction; }
-  /// Threads that evaluate parts and contact, and that factor the shared matrix; 0: as OpenMP says.
+  /// Sets how many threads evaluate parts and contact and factor the shared matrix. With 0 OpenMP chooses their number.
   void setThreads(int threads);
   ContactPotential* contact() { return contact_.get(); }   ///< null: nothing touches
   const ContactPotential* contact() const { return contact_.get(); }

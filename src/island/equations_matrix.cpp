@@ -235,8 +235,8 @@ std::vector<int> Equations::numberBlocks()
   return blocks;
 }
 
-/// Up to the largest pile of rods that was measured (200,000 unknowns), a factorisation took two thirds of the time of
-/// conjugate gradients, and less in small ones: see the study island_solvers.
+/// In piles of 16 to 256 rods (200,000 unknowns), a factorisation took half to two thirds of the time of conjugate
+/// gradients, so that nothing but a scene chooses these: see the study island_solvers.
 SharedMatrix::Solver Equations::chooseSolver()
 {
   if (solver == IslandSolver::conjugate_gradients)

@@ -66,7 +66,7 @@ public:
 
   /// `simplicial`: see SparseCholesky.
   explicit SharedMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
-  void setThreads(int threads) { threads_ = threads; }   ///< of factorisations and solutions with them
+  void setThreads(int threads) { threads_ = threads; }   ///< that factor and solve
 
   // ---- pattern
   void begin(int unknowns);

@@ -11,7 +11,8 @@ namespace slender {
 void ComponentCholesky::findComponents(const std::vector<int>& starts, const std::vector<int>& rows)
 {
   const int n = static_cast<int>(starts.size()) - 1;
-  std::vector<int> before(n);   // a forest: each unknown names an earlier one of its component, the first one itself
+  // Each unknown names an earlier one of its component. The first unknown of a component names itself.
+  std::vector<int> before(n);
   std::iota(before.begin(), before.end(), 0);
   const auto first = [&](int u) {
     while (before[u] != u)
@@ -60,7 +61,7 @@ void ComponentCholesky::analyse(Component& component)
 
 void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::vector<int>& rows)
 {
-  constexpr std::uint64_t kBasis = 0xcbf29ce484222325, kPrime = 0x100000001b3;   // of FNV-1a, here of whole numbers
+  constexpr std::uint64_t kBasis = 0xcbf29ce484222325, kPrime = 0x100000001b3;   // Constants of the hash FNV-1a.
   for (Component& component : components_)
     known_.emplace(component.hash, std::move(component));
   findComponents(starts, rows);

@@ -9,19 +9,19 @@
 
 namespace slender {
 
-/// Cholesky factorisation of a sparse symmetric matrix by its components: sets of unknowns such that no entry couples
-/// two sets. Each has its own factor. If its pattern equals that of a component of the previous matrix, it takes over
-/// the analysis, which changes no result, so that only what couples anew is analysed when contacts come and go. Several
-/// threads factor and solve several components.
+/// Cholesky factorisation of a sparse symmetric matrix by its components. Components are sets of unknowns such that no
+/// entry couples two sets. Each component has its own factor. If its pattern equals that of a component of the previous
+/// matrix, it takes over the analysis. So only what couples anew is analysed when contacts come and go, and no result
+/// changes. Several threads factor and solve several components.
 class ComponentCholesky
 {
 public:
   /// `simplicial`: see SparseCholesky.
   explicit ComponentCholesky(bool simplicial) : simplicial_(simplicial) {}
 
-  /// Lower triangle by columns, as SparseCholesky::setPattern() takes it.
+  /// Takes the lower triangle by columns, in the form of SparseCholesky::setPattern().
   void setPattern(const std::vector<int>& starts, const std::vector<int>& rows);
-  /// `values`: one per entry of the pattern. Returns whether the matrix is positive definite. `threads`: see
+  /// Returns whether the matrix is positive definite. `values` has one value per entry of the pattern. `threads`: see
   /// parallelFor().
   bool factor(const std::vector<double>& values, int threads);
   /// x := A^-1 x after a factor() that returned true.
@@ -30,8 +30,8 @@ public:
 private:
   struct Component
   {
-    std::vector<int> unknowns, entries;   ///< their places in the matrix; unknowns in ascending order
-    std::vector<int> starts, rows;        ///< pattern in its own numbers
+    std::vector<int> unknowns, entries;   ///< places in the matrix; unknowns are in ascending order
+    std::vector<int> starts, rows;        ///< the pattern, in the numbers of the component
     std::vector<double> x;                ///< work space of solve()
     std::uint64_t hash = 0;               ///< of the pattern
     bool definite = false;
@@ -42,8 +42,8 @@ private:
 
   const bool simplicial_;
   std::vector<Component> components_;
-  std::unordered_multimap<std::uint64_t, Component> known_;   ///< those of the previous pattern, by their hashes
-  std::vector<int> component_of_, number_;   ///< of unknowns: their components, and their numbers there
+  std::unordered_multimap<std::uint64_t, Component> known_;   ///< components of the previous pattern, by their hashes
+  std::vector<int> component_of_, number_;                    ///< of each unknown: its component, and its number there
 };
 
 }   // namespace slender

@@ -7,7 +7,8 @@
 namespace slender {
 
 /// Calls f(k) for 0 <= k < count, in any order, on this many threads. If `threads` is 0, OpenMP chooses their number.
-/// A thread takes `chunk` numbers at a time. f must not throw: the process would end, also where memory runs out.
+/// A thread takes `chunk` numbers at a time. f must not throw, because that ends the
+/// process. So it ends if memory runs out in f.
 template <class F>
 void parallelFor(int threads, int count, [[maybe_unused]] int chunk, F&& f)
 {

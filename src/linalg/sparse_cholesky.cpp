@@ -100,7 +100,8 @@ struct SparseCholesky::Impl
   cholmod_dense* right = nullptr;   ///< work space of solvePoints: for blocks
   PointVector permuted;             ///< for numbers
   SupernodalNumeric numeric;
-  /// Without points: the matrix in the order of elimination, where each entry goes there, and work space of solve().
+  /// For matrices without points: the matrix in the order of elimination, the place of each entry in it, and the work
+  /// space of solve().
   std::vector<int> permuted_starts, permuted_rows, permuted_at;
   std::vector<double> permuted_values, permuted_right;
 
@@ -131,8 +132,8 @@ void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<i
   m.takeOrder();
 }
 
-/// Keeps the matrix in the order of elimination: its lower triangle for supernodes, and else its upper triangle, whose
-/// columns CHOLMOD reads one by one. Otherwise CHOLMOD would make a permuted copy in each factorisation.
+/// Keeps the matrix in the order of elimination, because CHOLMOD would otherwise make a permuted copy in each
+/// factorisation. Supernodes need the lower triangle. CHOLMOD itself reads the columns of the upper triangle.
 void SparseCholesky::Impl::takeOrder()
 {
   const int n = static_cast<int>(starts.size()) - 1;
@@ -158,8 +159,8 @@ void SparseCholesky::Impl::takeOrder()
     }
   permuted_values.resize(rows.size());
   permuted_right.resize(n);
-  rows = {};                            // is in permuted_rows
-  factor->ordering = CHOLMOD_NATURAL;   // of the permuted matrix
+  rows = {};                            // permuted_rows has taken their place
+  factor->ordering = CHOLMOD_NATURAL;   // The permuted matrix has the right order.
   std::iota(static_cast<int*>(factor->Perm), static_cast<int*>(factor->Perm) + n, 0);
   if (!lower)
     return;

@@ -7,7 +7,7 @@ namespace {
 
 const char* folderOf(ObjectKind kind)
 {
-  // obstacles have one namespace, as in the pictures of nodes
+  // Obstacles have one namespace, as in the markers of nodes.
   static const char* const folders[] = {"rods/", "threads/", "cloths/", "bodies/", "obstacles", "grasps/", "nozzles/"};
   return folders[static_cast<int>(kind)];
 }

@@ -22,7 +22,7 @@ std::string text(const char* format, double value)
   return out;
 }
 
-/// `value`: a text or a number.
+/// `value` is a text or a number.
 template <class Value>
 void add(DiagnosticStatus& status, const std::string& key, const Value& value)
 {

@@ -1,4 +1,4 @@
-// Factorisation by components: right solutions, kept analyses, and matrices that are not definite.
+// Factorisation by components gives right solutions, keeps analyses, and finds matrices that are not definite.
 #include "linalg/component_cholesky.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ struct Matrix
     dense(a, a) += std::abs(value);
     dense(b, b) += std::abs(value);
   }
-  /// Couples the unknowns first, first + stride, ... each with as many of the next ones as `band` says.
+  /// Couples each of the unknowns first, first + stride, ... with the next `band` of them.
   void addBand(Random& random, int first, int stride, int count, int band)
   {
     for (int i = 0; i < count; ++i)
@@ -52,8 +52,8 @@ struct Matrix
   std::vector<double> values;
 };
 
-/// Solves with a pattern that may be new, and with a factorisation that knows nothing else: the results are equal to
-/// the last bit. Both solve the equations up to round-off.
+/// Solves with `kept`, which may know parts of the pattern, and with a fresh factorisation. The results are equal to
+/// the last bit, and solve the equations up to round-off.
 void solveWith(ComponentCholesky& kept, const Matrix& a, bool simplicial)
 {
   const Eigen::Index n = a.dense.rows();
@@ -69,7 +69,7 @@ void solveWith(ComponentCholesky& kept, const Matrix& a, bool simplicial)
     kept.solve(x.data(), threads);
     fresh.solve(y.data(), 1);
     EXPECT_EQ(x, y);
-    if (n > 0)   // the condition number is about 10
+    if (n > 0)   // The bound is round-off: the condition number is about 10.
       EXPECT_LT((a.dense.selfadjointView<Eigen::Lower>() * x - b).norm(), 1e-14 * b.norm());
   }
 }

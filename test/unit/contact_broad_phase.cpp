@@ -23,7 +23,7 @@ TEST(BroadPhase, FindsThePairsOfBruteForceInOrder)
   GridPairs grid;
   for (int k = 0; k < 60; ++k)
   {
-    const int n = k < 3 ? k : k == 59 ? 6000 : 20 + 10 * k;   // the last fills several shares of buckets
+    const int n = k < 3 ? k : k == 59 ? 6000 : 20 + 10 * k;   // The last one fills several ranges of buckets.
     const double spread = k % 3 == 0 ? 1e3 : 1.0;   // also far from the origin, and with a few huge or flat boxes
     std::vector<BoundingBox> boxes;
     for (int i = 0; i < n; ++i)

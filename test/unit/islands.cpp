@@ -225,8 +225,8 @@ TEST(IslandScheduler, IslandsDoNotDependOnTheNumberOfThreads)
   }
 }
 
-/// A layer of rods along y that lands on one along x, which lies on the floor: one island that is large enough for
-/// threads of its own.
+/// Rods along y land on rods along x, which lie on the floor. All are one island, which is large enough for several
+/// threads.
 std::string twoLayersOfRods()
 {
   std::string scene =
@@ -250,7 +250,7 @@ TEST(IslandScheduler, ALargeIslandDoesNotDependOnTheNumberOfThreads)
   Simulation one(parseScene(twoLayersOfRods(), "one")), many(parseScene(twoLayersOfRods(), "many"));
   one.setThreads(1);
   many.setThreads(3);
-  for (int k = 0; k < 12; ++k)   // the upper layer lands after about eight steps
+  for (int k = 0; k < 12; ++k)   // The upper layer lands after about eight steps.
   {
     ASSERT_TRUE(one.step(one.defaultInputs()).ok);
     ASSERT_TRUE(many.step(many.defaultInputs()).ok);

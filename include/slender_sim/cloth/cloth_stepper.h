@@ -41,7 +41,7 @@ enum class ClothSolver
   gauss_seidel   ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
 };
 
-/// How the equations of a cloth are solved.
+/// Says how the equations of a cloth are solved.
 struct ClothSolving
 {
   bool one_newton_step = false;   ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
@@ -55,17 +55,17 @@ struct ClothSolving
   double linear_tolerance = 5e-3;
 };
 
-/// How a cloth is advanced. Of the integrators:
+/// Says how a cloth is advanced. These are the integrators:
 ///  - implicit_euler: first order; damps what the step does not resolve.
 ///  - tr_bdf2: second order, likewise damping; two stages, each at about the price of a step of implicit Euler.
-///  - imex: first order; bending and its damping, and mass damping, are implicit, the membrane, its damping and
-///    the wind explicit (thesis 2.5.2). The matrix is constant, n x n, and factored once, so that a step costs one
-///    back-solve. Bending never limits the step, the membrane does as in explicit steps: h < 2 / omega, omega^2 the
-///    largest eigenvalue of M^-1 K of the membrane, about 0.5 edge sqrt(area density / modulus) [s]. Isometric bending
-///    (or none) only.
+///  - imex: first order. Bending, its damping and mass damping are implicit; the membrane, its damping and the wind
+///    are explicit (thesis 2.5.2). The matrix is constant (n x n) and is factored once, so that a step costs one
+///    back-solve. Bending never limits the step. The membrane limits it as in explicit steps: h < 2 / omega, where
+///    omega^2 is the largest eigenvalue of M^-1 K of the membrane. That is about 0.5 edge sqrt(area density / modulus)
+///    [s]. Bending has to be isometric, or there is none.
 ///  - symplectic_euler: first order, explicit; bending limits the step as well.
 ///
-/// Local errors are controlled with implicit_euler and tr_bdf2 only.
+/// Only implicit_euler and tr_bdf2 control the local error.
 struct ClothOptions : TimeConfig, ClothSolving
 {
   ClothOptions() { integrator = Integrator::implicit_euler; }

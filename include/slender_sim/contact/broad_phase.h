@@ -39,7 +39,7 @@ public:
   {
     int first, second;   ///< first < second
   };
-  /// All overlapping pairs, sorted. Boxes must be finite. `threads`: how many search; 0: as many as OpenMP has.
+  /// Returns all overlapping pairs, sorted. Boxes must be finite. `threads` search; with 0 OpenMP chooses their number.
   const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes, int threads = 1);
 
 private:
@@ -55,8 +55,8 @@ private:
   void sortPairs(int boxes);
 
   std::vector<Entry> entries_, sorted_;
-  std::vector<int> bucket_start_;          ///< one per bucket, then the number of entries
-  std::vector<std::vector<Pair>> found_;   ///< one list for each share of the buckets
+  std::vector<int> bucket_start_;          ///< of each bucket in sorted_; then the number of entries
+  std::vector<std::vector<Pair>> found_;   ///< one list for each range of buckets
   std::vector<Pair> pairs_;
   std::vector<int> first_start_;
 };

@@ -29,13 +29,14 @@ struct Twist
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();   ///< [rad/s]
 };
 
-/// Force and torque, in world axes. What exerts them on what, and about which point, is said where a wrench is given.
+/// A force and a torque in world axes. Whoever gives a wrench says what exerts it, and about which point.
 struct Wrench
 {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();    ///< [N]
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();   ///< [N m]
 
-  /// Adds a force that acts at a point, seen from the point about which the torque is.
+  /// Adds the force `more` [N], which acts at a point. `at` [m] is the way to this point from the point about which the
+  /// torque is taken.
   void add(const Eigen::Vector3d& more, const Eigen::Vector3d& at)
   {
     force += more;

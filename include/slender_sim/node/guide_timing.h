@@ -31,8 +31,8 @@ public:
     double delay = 0.05;
     bool automatic = false;   ///< the lag is the needed one; `delay` is used until the needed lag is known
     bool live = false;        ///< samples come in real time, so a missing sample may still come
-    /// [s] >= 0 for which the caller moves on after the last sample, until the motion is at rest. With more than 0 the
-    /// rate does not fall when samples are missing. With 0 the last sample is held.
+    /// [s] >= 0. After the last sample the caller moves on for this time, and is then at rest. With 0 it holds the last
+    /// sample. With more than 0 the rate does not fall when samples are missing.
     double coast = 0.0;
   };
 

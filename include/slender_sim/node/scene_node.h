@@ -185,7 +185,7 @@ private:
   std::unique_ptr<BagRecorder> bag_;
   SceneMessages messages_;
   SharedMessage<sensor_msgs::PointCloud2> points_;
-  std::vector<SharedMessage<geometry_msgs::PoseArray>> rod_poses_;   // as pubs_.each_rod_poses
+  std::vector<SharedMessage<geometry_msgs::PoseArray>> rod_poses_;   // in the order of pubs_.each_rod_poses
 
   Mode mode_ = Mode::running, mode_before_failure_ = Mode::running;
   bool finished_ = false;
@@ -210,7 +210,7 @@ private:
   std::unique_ptr<FrameBroadcaster> frames_;
   std::unique_ptr<GraspWrenches> wrenches_;
   std::unique_ptr<tf2_ros::StaticTransformBroadcaster> frame_broadcaster_;   // makes ~frame_id known to rviz
-  // all that advertise() makes
+  // What advertise() makes.
   struct Publishers
   {
     ros::Publisher bodies, grasps, obstacles, fields;                  // only if the scene has such objects

@@ -25,11 +25,11 @@ private:
     std::uint64_t step;
     double seconds;
   };
-  // how often instants are so many steps apart, and when first; shortest and longest time, and when that began [s]
+  // Of instants that are the same number of steps apart.
   struct Stride
   {
     std::uint64_t count = 0;
-    double first, least, most, most_at;
+    double first, least, most, most_at;   // [s] when first; shortest and longest time between; when the longest began
   };
   std::optional<Instant> last_;
   std::map<std::uint64_t, Stride> strides_;

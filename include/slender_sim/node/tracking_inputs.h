@@ -74,7 +74,7 @@ public:
     /// once are not late.
     double late() const { return excess - 2.0 * interval; }
   };
-  /// `buffer`: that of the input. `now`: time of the clock [s].
+  /// Returns the age of an input. `buffer` is that of the input, and `now` [s] the time of the clock.
   template <class Buffer>
   static Age ageOf(const std::string& name, const Buffer& buffer, double now)
   {

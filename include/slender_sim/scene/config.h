@@ -32,17 +32,18 @@ constexpr double kMaxCoordinate = 1e6;   ///< [m] of what a scene or a message p
 constexpr double kMaxBeltSpeed = 1e3;    ///< [m/s] of each component
 constexpr double kMaxWindSpeed = 1e3;    ///< [m/s] of each component
 
-/// A curve of the scene: a formula, or the points of a polyline.
+/// A curve of the scene is a formula, or the points of a polyline.
 struct Curve
 {
-  /// of a formula: how many it makes; of a polyline: those into which it is divided, nothing: the points are its nodes
+  /// A formula makes so many edges. A polyline is divided into so many; without a number its points are the nodes.
   std::optional<int> edges;
-  /// Nodes [m] of the curve with so many edges. A catenary hangs along gravity. Null: `points` are the curve.
+  /// Returns the nodes [m] of the curve with so many edges. A catenary hangs along gravity. If it is null, `points` are
+  /// the curve.
   std::function<Eigen::Matrix3Xd(int edges, const Eigen::Vector3d& gravity)> formula{};
   std::vector<Eigen::Vector3d> points{};   ///< from the scene or from a CSV file
 };
 
-/// `grading`: length of the last edge over that of the first.
+/// Returns a straight line. `grading` is the length of the last edge over that of the first.
 Curve straightLine(const Eigen::Vector3d& from, const Eigen::Vector3d& to, int edges, double grading = 1.0);
 
 /// Radii [m]; a vector has one entry per edge, or two (linear taper from the first to the last edge), or one.
@@ -205,7 +206,7 @@ struct RodConfig
   /// what it follows (`track`), with one set of test functions; null: nothing
   std::shared_ptr<const TrackingConfig> tracking;
   std::vector<SectionFrame> broadcast_tf;   ///< sections whose frames nodes publish on tf
-  int edges = 0;                            ///< of the rest shape, as the reader has found them; 0: not known
+  int edges = 0;                            ///< of the rest shape; the reader counts them; 0: not known
 
   int nodes() const { return edges + (edges > 0 && !closed ? 1 : 0); }
 };

@@ -77,7 +77,8 @@ struct ContactForce
   Eigen::Vector3d force;      ///< on what touches, a solid excepted [N]
 };
 
-/// Contacts by the barrier, and their sums on all obstacles and bodies, with torques about the world's origin.
+/// The contacts by the barrier, and the sum of their forces on each obstacle and body. Torques are about the world's
+/// origin.
 struct ContactLoads
 {
   std::vector<ContactForce> contacts;

@@ -20,7 +20,7 @@ bool endsMeet(const Eigen::Matrix3Xd& nodes)
 
 Eigen::Matrix3Xd dropLast(const Eigen::Matrix3Xd& nodes) { return nodes.leftCols(nodes.cols() - 1); }
 
-/// Points of the curve: a formula makes so many edges, and a polyline keeps its points.
+/// Returns the points of the curve. A formula makes so many edges. A polyline keeps its points.
 Eigen::Matrix3Xd curvePoints(const Curve& curve, const Eigen::Vector3d& gravity, int edges)
 {
   if (curve.formula)

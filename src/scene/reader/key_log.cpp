@@ -98,7 +98,7 @@ void KeyLog::note(const std::string& path, const std::string& what)
 
 std::vector<SceneKey> KeyLog::keys() const
 {
-  // By the places of a key and of all keys that it is part of; places in lists are not asked for themselves.
+  // Keys are ordered by their places and by those of all keys that contain them. Entries of lists have no place.
   std::map<std::vector<std::pair<long, std::size_t>>, const Entry*> sorted;
   for (const Entry& entry : entries_)
   {

@@ -85,7 +85,7 @@ Curve readHelix(YamlMap& map)
   return {edges, [=](int n, const Eigen::Vector3d&) { return helixCurve(center, axis, radius, pitch, turns, n); }};
 }
 
-/// The chain hangs along gravity, without gravity along -z.
+/// The chain hangs along gravity. Without gravity it hangs along -z.
 Curve readCatenary(YamlMap& map)
 {
   Eigen::Vector3d from(0, 0, 0), to(1, 0, 0);
@@ -189,7 +189,7 @@ std::optional<Curve> readCurve(const YamlCursor& at, const ReadContext& context)
   kinds.add("vee", "Two straight arms that meet at a tip.", readVee);
   kinds.add("file", "A polyline through the points of a file.", [&](YamlMap& map) { return readFile(map, context); });
   const std::optional<Curve> curve = kinds.read("curves");
-  // a rod along it gets at least so many edges
+  // A rod along the curve gets at least so many edges.
   const auto edges = [](const Curve& c) { return std::max(c.edges.value_or(0), static_cast<int>(c.points.size())); };
   return curve && context.claim(kinds.value(), edges(*curve)) ? curve : std::nullopt;
 }

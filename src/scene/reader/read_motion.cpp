@@ -65,11 +65,11 @@ std::optional<TfMotion> readTf(const YamlCursor& tf, const YamlCursor& offset)
   return motion;
 }
 
-/// What the keys of a motion mean for one kind of things.
+/// Says what the keys of a motion mean for one kind of object.
 struct MotionTexts
 {
   const char *topic, *body, *table;
-  std::string kinds;   ///< what a motion must be
+  std::string kinds;   ///< the motions that this kind may have, for messages
 };
 
 /// Reads a motion that is a map: by messages, with a frame of tf, with a body, or by timed poses. It is fixed if a

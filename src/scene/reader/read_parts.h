@@ -43,7 +43,7 @@ inline std::vector<YamlCursor> entriesOf(const YamlCursor& list)
 /// Reports a name that another object has. `names` says what has each of them.
 void takeName(std::map<std::string, std::string>& names, const YamlCursor& entry, const std::string& name);
 /// Reads the entries of a list by read(entry, context, default name). The default name is `word`, with a number if
-/// there are several entries. Reports a list of fewer or more entries; none if there is no list.
+/// there are several entries. Reports a list with too few or too many entries. Without a list there are no entries.
 template <class Read>
 auto readEach(const YamlCursor& list, std::size_t fewest, std::size_t most, const std::string& word,
               const ReadContext& context, const Read& read)
@@ -120,7 +120,7 @@ void readOffset(YamlMap& map, GraspConfig& grasp);
 LimitsConfig readLimits(const YamlCursor& at);
 GraspLimits readGraspLimits(const YamlCursor& at);
 GraspConfig readGrasp(const std::string& name, const YamlCursor& at, const ReadContext& context, const RodConfig& rod);
-/// Point loads of a rod.
+/// Reads the point loads of a rod.
 std::vector<RodLoadConfig> readRodLoads(const YamlCursor& at, const RodConfig& rod);
 CrossSection readCrossSection(const YamlCursor& at, int edges);
 /// Warns that contact treats elliptical sections of a rod as circles. Call this after its cross-section and its contact
@@ -130,7 +130,8 @@ Material readMaterial(const YamlCursor& at);
 Damping readDamping(const YamlCursor& at);
 /// What rods of a scene and those of a generator have in common: curvature, formulation, material, damping, contact.
 void readTraits(YamlMap& map, RodConfig& rod);
-/// `track` of a rod, all else of which has been read; null without it, or when something was reported.
+/// Reads `track` of a rod, after all its other keys. Returns null if there is no such key, or if something was
+/// reported.
 std::shared_ptr<const TrackingConfig> readTrackedCurve(const YamlCursor& at, const ReadContext& context,
                                                        const RodConfig& rod);
 RodConfig readRod(const YamlCursor& at, const ReadContext& context, const std::string& default_name);

@@ -81,7 +81,7 @@ void readGrasps(const YamlCursor& at, const ReadContext& context, RodConfig& rod
   }
 }
 
-/// Reads the curves and counts the edges that they give. Leaves 0 when they could not be read or do not make a rod.
+/// Reads the curves and counts the edges of the rod. Their number stays 0 if the curves cannot be read or are no rod.
 void readCenterline(YamlMap& map, const ReadContext& context, RodConfig& rod)
 {
   const YamlCursor centerline =

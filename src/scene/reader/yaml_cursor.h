@@ -16,8 +16,8 @@
 
 namespace slender {
 
-/// The whole text as a decimal number (1, -2.5, 1e6, +3, also YAML's .inf and .nan), whatever the locale; nothing if it
-/// is not one. Too large to represent gives infinity.
+/// Returns the value of a text that is a decimal number as a whole (1, -2.5, 1e6, +3, also YAML's .inf and .nan),
+/// whatever the locale. Returns nothing for other texts, and infinity if the number is too large.
 std::optional<double> parseNumber(const std::string& text);
 
 /// Allowed values of a number, written as mathematicians do: (0, 10] m.
@@ -51,7 +51,7 @@ void assign(Target& target, const std::optional<Value>& value)
 template <class Value>
 using Choices = std::vector<std::pair<std::string, Value>>;
 
-/// All values of an enumeration up to its last one, with the words of toString().
+/// Returns all values of an enumeration up to `last`, with the words of toString().
 template <class Value>
 Choices<Value> allUpTo(Value last)
 {

@@ -48,7 +48,7 @@ YamlTree parseYaml(const std::string& text, const std::string& file);
 /// The document written out again (what nodes publish after overrides).
 std::string writeYaml(const YamlTree& tree);
 
-/// The parts of a text between its separators; at least one.
+/// Returns the parts of a text between its separators. There is at least one.
 std::vector<std::string> split(const std::string& text, char separator);
 
 /// Applies "path.to.value=YAML". Missing keys are created. An entry of a list is given by its index (negative: from the

@@ -4,7 +4,7 @@
 
 #include "slender_sim/scene/simulation.h"
 
-/// What the message of a failed step says beside the reason of the failure.
+/// Returns what the message of a failed step says beside the reason of the failure.
 namespace slender {
 
 /// What is near the place of a failed step, for its message: the nearest active grasp, weld or held end of the same

@@ -153,7 +153,7 @@ void ignoreOf(const std::vector<GraspConfig>& grasps, const HeldObject& object, 
     object.ignored.push_back(std::move(solid));
 }
 
-/// Neighbours of points that so many edges join. ends(edge): its two points.
+/// Returns the neighbours of points that edges join. ends(edge) returns the two points of an edge.
 template <class Ends>
 std::vector<std::vector<int>> neighboursOf(int points, int edges, const Ends& ends)
 {

@@ -237,8 +237,8 @@ void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
   }
 }
 
-/// Checks the largest strain of so many edges of a rod or cloth. stretch(edge): its length over that at rest;
-/// name(edge): for messages. `held`: index of the rod and of the cloth; the other is -1.
+/// Checks the largest strain of the edges of a rod or cloth. stretch(edge) is the length of an edge over that at rest.
+/// name(edge) is for messages. `held` has the index of the rod and that of the cloth, of which one is -1.
 template <class Stretch, class Name>
 void LimitWatch::checkStrain(const Key& key, double limit, int edges, const Stretch& stretch, const Name& name,
                              const std::pair<int, int>& held, std::vector<LimitExcess>& begun)

@@ -17,7 +17,7 @@ struct BodyWeld
   int rod;             ///< that it holds
   std::size_t grasp;   ///< index among the grasps of the rod: welds follow its own grasps, in the order of all welds
 };
-/// All welds of a scene.
+/// Returns all welds of a scene.
 std::vector<BodyWeld> weldsOf(const SceneConfig& config);
 
 class StateTransfer
