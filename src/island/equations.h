@@ -84,7 +84,7 @@ public:
   void endStage();
   double forceScale() const;   ///< largest force [N]
   double residual() const;     ///< largest unbalanced force [N]
-  /// Iterations of conjugate gradients since the step began.
+  /// Iterations of sweeps since the step began.
   int linearIterations() const { return linear_iterations_; }
 
   // ---- for the stability of an equilibrium
@@ -162,7 +162,6 @@ private:
   void takeNewKeys();
   void buildPattern();
   void noteParts();
-  std::vector<int> numberBlocks();
   SharedMatrix::Solver chooseSolver();
   bool sweepsPay();
   SharedMatrix::Bases basesOf(const int (&point)[4]) const;

@@ -1,7 +1,6 @@
 // Several parts and their contact as one system for Newton's method: forces, the shared matrix, and its solution.
 #include <algorithm>
 #include <iterator>
-#include <limits>
 
 #include "island/equations_loops.h"
 
@@ -211,8 +210,7 @@ void Equations::buildPattern()
     columnsOf(term, rows);
     matrix_.noteRows(rows.data(), 3);
   }
-  const std::vector<int> blocks = numberBlocks();
-  matrix_.finish(chooseSolver(), blocks, turns_of_triples_);
+  matrix_.finish(chooseSolver(), turns_of_triples_);
   keys_valid_ = true;
   forAllParts([&](Part& part) {
     if (part.coupled)
@@ -220,27 +218,8 @@ void Equations::buildPattern()
   });
 }
 
-/// Numbers the blocks of the matrix: parts that joints connect are one block, any other part is one. Returns the block
-/// of each unknown.
-std::vector<int> Equations::numberBlocks()
-{
-  std::vector<int> blocks;
-  int count = 1;   // the first is that of joined parts
-  for (Part* part : parts_)
-    if (part->coupled)
-    {
-      part->block = part->joined() ? 0 : count++;
-      blocks.insert(blocks.end(), static_cast<std::size_t>(part->unknowns()), part->block);
-    }
-  return blocks;
-}
-
-/// In piles of 16 to 256 rods (200,000 unknowns), a factorisation took half to two thirds of the time of conjugate
-/// gradients, so that nothing but a scene chooses these: see the study island_solvers.
 SharedMatrix::Solver Equations::chooseSolver()
 {
-  if (solver == IslandSolver::conjugate_gradients)
-    return SharedMatrix::Solver::conjugate_gradients;
   // The Schur complement of averages needs many exact solutions.
   return solver == IslandSolver::automatic && !anyAverages() && sweepsPay() ? SharedMatrix::Solver::sweeps
                                                                             : SharedMatrix::Solver::cholesky;
@@ -375,16 +354,8 @@ void Equations::solve()
   by_newton_ = shift_.none();
   for (Part* part : parts_)
     part->has_direction = !part->settled;
-  const bool solved = matrix_.solve();
+  matrix_.solve();
   linear_iterations_ += matrix_.linearIterations();
-  if (!solved)
-  {
-    assemble(shift_, false);   // without what may be negative
-    if (matrix_.factorDirectly())
-      matrix_.solve();
-    else   // There is no direction, so that the step fails.
-      std::fill_n(matrix_.solution(), matrix_.unknowns(), std::numeric_limits<double>::quiet_NaN());
-  }
   if (anyAverages())
     keepAverages();
   forParts([](Part& part) {

@@ -24,7 +24,6 @@ struct PartInIsland
   const void* island = nullptr;   ///< in which the part was stepped last
   bool coupled = false;           ///< the matrix of the island has its unknowns
   int offset = 0;                 ///< number of its first unknown in that matrix
-  int block = 0;                  ///< number of its block of that matrix
   /// Newton's method has converged for the part, and nothing couples or touches it. It is neither evaluated nor moved
   /// until something comes near, or what is prescribed moves.
   bool settled = false;

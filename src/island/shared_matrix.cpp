@@ -118,7 +118,7 @@ void SharedMatrix::noteBlocks()
   }
 }
 
-void SharedMatrix::finish(Solver solver, const std::vector<int>& blocks, const std::vector<char>& turns)
+void SharedMatrix::finish(Solver solver, const std::vector<char>& turns)
 {
   solver_ = solver;
   cholesky_known_ = false;
@@ -133,38 +133,11 @@ void SharedMatrix::finish(Solver solver, const std::vector<int>& blocks, const s
     starts_.push_back(static_cast<int>(rows_.size()));
   }
   values_.assign(rows_.size(), 0.0);
-  if (solver_ == Solver::conjugate_gradients)
-    takeBlocks(blocks);
   if (solver_ != Solver::sweeps)
     return;
   if (!sweeps_)
     sweeps_ = std::make_unique<PointSweeps>();
   sweeps_->setPattern(starts_, rows_, turns);
-}
-
-/// The pattern of the blocks stays when contacts between blocks come and go. Then its analysis stays, too.
-void SharedMatrix::takeBlocks(const std::vector<int>& blocks)
-{
-  std::vector<int> starts{0}, rows;
-  block_entries_.clear();
-  for (int u = 0; u < unknowns_; ++u)
-  {
-    for (int k = starts_[u]; k < starts_[u + 1]; ++k)
-      if (blocks[rows_[k]] == blocks[u])
-      {
-        rows.push_back(rows_[k]);
-        block_entries_.push_back(k);
-      }
-    starts.push_back(static_cast<int>(rows.size()));
-  }
-  if (starts != block_starts_ || rows != block_rows_)
-  {
-    block_cholesky_.setPattern(starts, rows);
-    block_starts_ = std::move(starts);
-    block_rows_ = std::move(rows);
-  }
-  gradients_.resize(static_cast<std::size_t>(unknowns_));
-  x_.resize(static_cast<std::size_t>(unknowns_));
 }
 
 int SharedMatrix::index(int a, int b) const
@@ -177,10 +150,7 @@ int SharedMatrix::index(int a, int b) const
 
 // ---- solutions
 
-bool SharedMatrix::factorPresent()
-{
-  return solver_ == Solver::cholesky ? factorDirectly() : solver_ == Solver::sweeps ? sweep() : factorBlocks();
-}
+bool SharedMatrix::factorPresent() { return solver_ == Solver::cholesky ? factorDirectly() : sweep(); }
 
 bool SharedMatrix::sweep()
 {
@@ -209,70 +179,17 @@ bool SharedMatrix::factorDirectly()
   return cholesky_.factor(values_, threads_);
 }
 
-bool SharedMatrix::factorBlocks()
-{
-  direct_ = false;
-  if (unknowns_ == 0)
-    return true;
-  block_values_.resize(block_entries_.size());
-  for (std::size_t k = 0; k < block_entries_.size(); ++k)
-    block_values_[k] = values_[block_entries_[k]];
-  return block_cholesky_.factor(block_values_, threads_);
-}
-
-bool SharedMatrix::solve()
+void SharedMatrix::solve()
 {
   if (unknowns_ == 0)
-    return true;
-  if (direct_)
-  {
-    iterations_ = 0;
-    cholesky_.solve(solution_.data(), threads_);
-    return true;
-  }
-  if (solver_ == Solver::sweeps)
+    return;
+  if (!direct_)
   {
     sweeps_->copySolution(solution_.data());
-    return true;
+    return;
   }
-  constexpr double kTolerance = 1e-9;   // Newton's method then converges as with a direct solution
-  constexpr int kMostIterations = 300;
-  const LinearResult result = gradients_.solve(
-      solution_, x_, kTolerance, kMostIterations,
-      [this](const std::vector<double>& p, std::vector<double>& ap) { multiply(p, ap); },
-      [this](const std::vector<double>& r, std::vector<double>& z) {
-        z = r;
-        block_cholesky_.solve(z.data(), threads_);
-      });
-  iterations_ = result.iterations;
-  if (!result.definite || result.residual > kTolerance)
-    return false;
-  solution_.swap(x_);
-  return true;
-}
-
-/// y := A x
-void SharedMatrix::multiply(const std::vector<double>& x, std::vector<double>& y) const
-{
-  std::fill(y.begin(), y.end(), 0.0);
-  for (int u = 0; u < unknowns_; ++u)
-  {
-    double sum = 0.0;
-    for (int k = starts_[u]; k < starts_[u + 1]; ++k)
-    {
-      const int row = rows_[k];
-      sum += values_[k] * x[row];
-      if (row != u)
-        y[row] += values_[k] * x[u];
-    }
-    y[u] += sum;
-  }
-}
-
-double SharedMatrix::Space::dot(const Vector& x, const Vector& y)
-{
-  const auto n = static_cast<Eigen::Index>(x.size());
-  return Eigen::Map<const Eigen::VectorXd>(x.data(), n).dot(Eigen::Map<const Eigen::VectorXd>(y.data(), n));
+  iterations_ = 0;
+  cholesky_.solve(solution_.data(), threads_);
 }
 
 void SharedMatrix::addPair(const Columns& a, const Columns& b, double value)

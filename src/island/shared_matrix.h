@@ -8,7 +8,6 @@
 #include "island/point_sweeps.h"
 #include "linalg/component_cholesky.h"
 #include "slender_sim/contact/contact_surface.h"
-#include "slender_sim/linalg/conjugate_gradients.h"
 
 namespace slender {
 
@@ -33,18 +32,15 @@ private:
 /// finish(). What stays while contacts come and go is noted once: see keepNoted(). For one matrix: factor() with a
 /// function that calls clear() and adds all entries.
 ///
-/// There are three solvers: sparse Cholesky factorisation, conjugate gradients that are preconditioned by the
-/// factorisation of blocks (the matrix without the entries that couple different blocks), and conjugate gradients that
-/// are preconditioned by sweeps over points of three unknowns each. Put the right-hand side into solution() before you
-/// call factor(). Sweeps already solve the equations in factor(), because only the solution shows whether the matrix is
-/// positive definite.
+/// There are two solvers: sparse Cholesky factorisation, and conjugate gradients that are preconditioned by sweeps over
+/// points of three unknowns each. Put the right-hand side into solution() before you call factor(). Sweeps already
+/// solve the equations in factor(), because only the solution shows whether the matrix is positive definite.
 class SharedMatrix
 {
 public:
   enum class Solver
   {
     cholesky,
-    conjugate_gradients,
     sweeps
   };
 
@@ -65,7 +61,7 @@ public:
   using Bases = std::array<int, 4>;
 
   /// `simplicial`: see SparseCholesky.
-  explicit SharedMatrix(bool simplicial) : cholesky_(simplicial), block_cholesky_(simplicial) {}
+  explicit SharedMatrix(bool simplicial) : cholesky_(simplicial) {}
   void setThreads(int threads) { threads_ = threads; }   ///< that factor and solve
 
   // ---- pattern
@@ -78,10 +74,8 @@ public:
   /// What has been noted so far remains noted when beginAgain() begins the next pattern of the same unknowns.
   void keepNoted();
   void beginAgain();
-  /// `blocks`: the number of the block that each unknown belongs to; only `conjugate_gradients` needs it. `turns`: see
-  /// PointSweeps; only `sweeps` needs it.
-  void finish(Solver solver = Solver::cholesky, const std::vector<int>& blocks = {},
-              const std::vector<char>& turns = {});
+  /// `turns`: see PointSweeps; only `sweeps` needs it.
+  void finish(Solver solver = Solver::cholesky, const std::vector<char>& turns = {});
   int unknowns() const { return unknowns_; }
   Solver solver() const { return solver_; }
   /// Where an entry of the pattern lies among values().
@@ -115,8 +109,7 @@ public:
   void beginStage() { whole_ = swept_ = {}; }
   /// Factors what assemble(whole) makes: with the contacts' whole second derivatives where `contacts` says that there
   /// are any, that is due and leaves the matrix positive definite; else without those parts of them that may be
-  /// negative. Returns whether the matrix is positive definite. With conjugate gradients, only the blocks are
-  /// examined; see solve().
+  /// negative. Returns whether the matrix is positive definite.
   template <class Assemble>
   bool factor(bool contacts, Assemble&& assemble)
   {
@@ -141,21 +134,13 @@ public:
   /// Right-hand side, then solution: one per unknown.
   double* solution() { return solution_.data(); }
   const double* solution() const { return solution_.data(); }
-  /// Returns false if conjugate gradients met negative curvature, or did not converge; then the solution is still the
-  /// right-hand side.
-  bool solve();
+  void solve();
   /// Factors the present values by Cholesky factorisation, which solve() then uses, whatever the solver is.
   bool factorDirectly();
   /// Of the last solve().
   int linearIterations() const { return iterations_; }
 
 private:
-  struct Space
-  {
-    using Vector = std::vector<double>;
-    static double dot(const Vector& x, const Vector& y);
-  };
-
   /// A matrix of some rows. It has one column for each unknown that the rows contain. The unknowns are in ascending
   /// order, and `weight` has their weights in the rows.
   struct MergedRows
@@ -172,11 +157,8 @@ private:
   void appendNoted(int column, std::vector<int>& rows);
   template <class Block>
   void addBlocks(const Bases& bases, Block&& block);
-  void takeBlocks(const std::vector<int>& blocks);
   bool factorPresent();
-  bool factorBlocks();
   bool sweep();
-  void multiply(const std::vector<double>& x, std::vector<double>& y) const;
 
   /// When to factor with whole second derivatives. Newton's method needs them where curves run along each other, but
   /// the matrix may be indefinite with them.
@@ -197,12 +179,6 @@ private:
   bool direct_ = true;            ///< the last factorisation is that of the whole matrix
 
   std::unique_ptr<PointSweeps> sweeps_;   ///< once they are needed
-  ComponentCholesky block_cholesky_;
-  std::vector<int> block_entries_;               ///< places in values_ of the entries of blocks
-  std::vector<int> block_starts_, block_rows_;   ///< pattern of the blocks
-  std::vector<double> block_values_;
-  ConjugateGradientsIn<Space> gradients_;
-  std::vector<double> x_;
   int iterations_ = 0;
 };
 

@@ -59,7 +59,7 @@ const std::vector<Plan>& plans()
        {"tracking_overhead", "willmore_smoothing", "hair", "tree"}},
       {"Cost against size",
        "",
-       {"cost_model", "rod_scaling", "island_solvers"},
+       {"cost_model", "rod_scaling"},
        {"rod_implicit_vs_explicit", "thread_implicit_vs_explicit"}},
       {"What a scene does not name",
        "Instructions counted by valgrind, told apart by the lines of the sources that they come from.",

@@ -299,47 +299,6 @@ TEST(IslandScheduler, SavedIslandsGoOnBitByBit)
     EXPECT_EQ(run.state().rods[r].x, other.state().rods[r].x) << r;
 }
 
-/// Three layers of four crossed rods each on a floor: contacts close many loops of parts.
-std::string pile(const std::string& solver)
-{
-  std::string rods;
-  for (int layer = 0; layer < 3; ++layer)
-    for (int k = 0; k < 4; ++k)
-    {
-      const double across = 0.012 * (k + 1), z = (2.05 * layer + 1.05) * 0.002;
-      const auto at = [&](double along) {
-        const double x = layer % 2 ? across : along, y = layer % 2 ? along : across;
-        return "[" + std::to_string(x) + ", " + std::to_string(y) + ", " + std::to_string(z) + "]";
-      };
-      rods += "  - {name: rod" + std::to_string(4 * layer + k) + ", centerline: {straight: {from: " + at(0.0) +
-              ", to: " + at(0.06) + ", edges: 15}}, cross_section: {radius: 0.002}, material: {density: 1100, " +
-              "youngs_modulus: 2.0e6, poissons_ratio: 0.4}, contact: {friction: 0.3}}\n";
-    }
-  return "time: {step: 0.002, duration: 1, newton: {linear: " + solver + "}}\ncontact: {gap: 2.0e-4}\nobstacles:\n" +
-         "  - {name: floor, shape: {plane: {point: [0, 0, 0], normal: [0, 0, 1]}}}\nrods:\n" + rods;
-}
-
-TEST(IslandScheduler, IterativeAndDirectSolutionsAgree)
-{
-  Simulation direct(parseScene(pile("cholesky"), "direct")),
-      iterative(parseScene(pile("conjugate_gradients"), "iterative")), automatic(parseScene(pile("auto"), "automatic"));
-  int linear = 0;
-  for (int k = 0; k < 25; ++k)
-  {
-    const StepReport factored = direct.step(direct.defaultInputs()),
-                     iterated = iterative.step(iterative.defaultInputs()),
-                     chosen = automatic.step(automatic.defaultInputs());
-    ASSERT_TRUE(factored.ok && iterated.ok && chosen.ok) << k;
-    EXPECT_EQ(factored.linear_iterations, 0);
-    EXPECT_EQ(chosen.linear_iterations, 0);   // a small pile is factored
-    linear += iterated.linear_iterations;
-  }
-  EXPECT_GT(linear, 25);
-  EXPECT_GT(direct.world().contacts().size(), 32u);
-  for (std::size_t r = 0; r < 12; ++r)   // Newton's method ends below 1e-6 of an edge
-    EXPECT_LT((direct.state().rods[r].x - iterative.state().rods[r].x).cwiseAbs().maxCoeff(), 1e-9) << r;
-}
-
 TEST(IslandScheduler, RefusesIntegratorsThatThreadsDoNotHave)
 {
   EXPECT_THROW(Simulation(parseScene(kCrossing, "bdf2", {"time.integrator=bdf2"})), SceneError);

@@ -26,9 +26,8 @@ struct NewtonConfig
 /// How the linear equations of an island of several parts are solved.
 enum class IslandSolver
 {
-  automatic,   ///< by how many parts meet how many others
-  cholesky,
-  conjugate_gradients   ///< preconditioned by the factors of the parts
+  automatic,   ///< by sweeps where they pay, which are for cloth of many vertices, else by Cholesky factorisation
+  cholesky
 };
 
 struct TimeConfig

@@ -39,12 +39,9 @@ TimeConfig readTime(const YamlCursor& at)
              "Number of Newton iterations after which a step counts as failed. Without the key: 30.");
   newton.get("max_cuts", time.newton.max_cuts, Range::closed(0, 30),
              "How often a step that fails is halved before it is refused. Without the key: 10.");
-  newton.get("linear", time.island_solver,
-             {{"auto", IslandSolver::automatic},
-              {"cholesky", IslandSolver::cholesky},
-              {"conjugate_gradients", IslandSolver::conjugate_gradients}},
-             "Solver of the linear equations of objects that touch or are joined. Without the key, or with auto, it is "
-             "chosen by their kinds.");
+  newton.get("linear", time.island_solver, {{"auto", IslandSolver::automatic}, {"cholesky", IslandSolver::cholesky}},
+             "Solver of the linear equations of objects that touch or are joined. Without the key, or with auto, cloth "
+             "is solved by sweeps over its vertices, also beside bodies, and everything else by factorisation.");
   return time;
 }
 
