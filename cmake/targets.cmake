@@ -19,12 +19,6 @@ if(NOT CMAKE_INSTALL_PREFIX STREQUAL "/usr")
 endif()
 set_target_properties(slender_sim PROPERTIES INSTALL_RPATH "${BESIDE}")
 
-# Rods of one scene are stepped in parallel where the compiler has OpenMP; results do not depend on it.
-find_package(OpenMP QUIET COMPONENTS CXX)
-if(OpenMP_CXX_FOUND)
-  target_link_libraries(slender_sim PRIVATE OpenMP::OpenMP_CXX)
-endif()
-
 if(WITH_ROS)
   include(${PROJECT_SOURCE_DIR}/cmake/nodes.cmake OPTIONAL)
 endif()

@@ -7,7 +7,7 @@
 namespace slender {
 
 /// Numeric part of a sparse Cholesky factorisation by supernodes, left-looking [Ng & Peyton, SIAM J. Sci. Comput. 14
-/// (1993), 1034] as in CHOLMOD, whose own takes memory in each call (workspace, teams of OpenMP threads). This one has
+/// (1993), 1034] as in CHOLMOD, whose own takes memory in each call (workspace, teams of threads). This one has
 /// all of it from setPattern() on and stays in its caller's thread.
 class SupernodalNumeric
 {

@@ -12,7 +12,7 @@ namespace slender {
 class GroupLoop
 {
 public:
-  int threads = 0;   ///< that are used; 0: as OpenMP says
+  int threads = 0;   ///< that are used; 0: see parallelFor()
 
   /// Calls step(k), which returns a StepReport, for 0 <= k < count, and merges the reports in this order into `total`.
   /// `nodes`: of all islands. Throws what a call throws, after all calls.

@@ -39,7 +39,7 @@ public:
   Island& island() { return island_; }
   /// Whether its parts are worth several threads.
   bool isLarge() const;
-  /// Threads that evaluate its parts; 0: as OpenMP says.
+  /// Threads that evaluate its parts; 0: see parallelFor().
   void setThreads(int threads);
 
 private:

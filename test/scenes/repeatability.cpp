@@ -46,8 +46,8 @@ TEST_P(ShippedScene, isTheSameTwiceToTheBit)
   command << SLENDER_SIMULATE << " " << file << reduced << " --quiet --duration "
           << 3.0 * slender::readScene(file).time.step << " --state " << folder_ << "/";
   const Result first =
-      slender::test::shell("MALLOC_PERTURB_=128 OMP_NUM_THREADS=1 " + command.str() + "first --threads 1");
-  const Result second = slender::test::shell("MALLOC_PERTURB_=1 MALLOC_MMAP_THRESHOLD_=1073741824 OMP_NUM_THREADS=3 " +
+      slender::test::shell("MALLOC_PERTURB_=128 SLENDER_THREADS=1 " + command.str() + "first --threads 1");
+  const Result second = slender::test::shell("MALLOC_PERTURB_=1 MALLOC_MMAP_THRESHOLD_=1073741824 SLENDER_THREADS=3 " +
                                              command.str() + "second --threads 3");
   ASSERT_EQ(first.status, 0) << first.output;
   EXPECT_EQ(second.status, 0) << second.output;

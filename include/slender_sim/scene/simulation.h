@@ -71,8 +71,8 @@ public:
   /// track a guide) or only threads. StaticsRun::end tells whether an equilibrium was not found.
   StaticsRun runStatics();
 
-  /// Sets the number of threads for scenes with several rods (at least 1; default: that of OpenMP). Results do not
-  /// depend on it.
+  /// Sets the number of threads for scenes with several rods (at least 1; default: that of the environment variable
+  /// SLENDER_THREADS, or else of the processors). Results do not depend on it.
   void setThreads(int threads) { world_->setThreads(threads); }
 
   /// Returns to the initial state. Throws SceneError if an edit makes surfaces cross in the initial state; the present

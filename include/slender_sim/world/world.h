@@ -53,7 +53,8 @@ public:
   /// std::invalid_argument for tracked parts and for cloths with contact.
   StepReport solveEquilibrium(WorldState& state, const WorldInputs& inputs);
 
-  /// Threads for lone rods and for contact (at least 1; default: what OpenMP offers). Results do not depend on it.
+  /// Threads for lone rods and for contact (at least 1; default: that of the environment variable SLENDER_THREADS, or
+  /// else of the processors). Results do not depend on it.
   void setThreads(int threads);
   /// Throws std::invalid_argument where cloths with contact cross something in this state.
   void checkCloths(WorldState& state);

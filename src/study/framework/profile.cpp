@@ -200,7 +200,7 @@ std::string Profiler::run(const std::string& tool, const std::string& scene, dou
   const std::string file = folder_ + "/scene.yaml", log = folder_ + "/log.txt";
   std::ofstream(file) << scene;
   // One thread, and instructions that valgrind knows: so that counts do not depend on the machine.
-  std::string command = "SLENDER_ISA=baseline OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 valgrind " + tool + " " +
+  std::string command = "SLENDER_ISA=baseline SLENDER_THREADS=1 OPENBLAS_NUM_THREADS=1 valgrind " + tool + " " +
                         shellWord(simulate_) + " " + shellWord(file) + " --quiet --threads 1 --duration " +
                         std::to_string(step * steps);
   for (std::string word : options)

@@ -77,8 +77,8 @@ public:
   {
     const std::string state = folder_ + "/state", printed = folder_ + "/printed";
     fs::remove(state);
-    const std::string environment = second ? "MALLOC_PERTURB_=1 MALLOC_MMAP_THRESHOLD_=1073741824 OMP_NUM_THREADS=3 "
-                                           : "MALLOC_PERTURB_=128 OMP_NUM_THREADS=1 ";
+    const std::string environment = second ? "MALLOC_PERTURB_=1 MALLOC_MMAP_THRESHOLD_=1073741824 SLENDER_THREADS=3 "
+                                           : "MALLOC_PERTURB_=128 SLENDER_THREADS=1 ";
     const std::string command = environment + shellWord(simulate_) + " " + shellWord(scene) + " " + options +
                                 " --threads " + (second ? "3" : "1") + " --state " + shellWord(state) + " > " +
                                 shellWord(printed) + " 2>&1";
