@@ -48,7 +48,7 @@ double GridPairs::cellSize(const std::vector<BoundingBox>& boxes) const
 }
 
 /// Sorts the boxes by the buckets of the cells that they overlap.
-void GridPairs::fillBuckets(const std::vector<BoundingBox>& boxes, double inverse_size)
+void GridPairs::fillBuckets(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, double inverse_size)
 {
   entries_.clear();
   for (std::size_t i = 0; i < boxes.size(); ++i)
@@ -62,7 +62,7 @@ void GridPairs::fillBuckets(const std::vector<BoundingBox>& boxes, double invers
     for (std::int32_t x = low[0]; x <= high[0]; ++x)
       for (std::int32_t y = low[1]; y <= high[1]; ++y)
         for (std::int32_t z = low[2]; z <= high[2]; ++z)
-          entries_.push_back({{x, y, z}, static_cast<int>(i)});
+          entries_.push_back({{x, y, z}, static_cast<int>(i), sets[i]});
   }
   unsigned buckets = 64;
   while (buckets < entries_.size())
@@ -84,7 +84,8 @@ void GridPairs::search(const std::vector<BoundingBox>& boxes, double inverse_siz
     for (int q = p + 1; q < to; ++q)
     {
       const Entry &a = sorted_[p], &b = sorted_[q];
-      if (a.cell[0] != b.cell[0] || a.cell[1] != b.cell[1] || a.cell[2] != b.cell[2])
+      if ((a.set == b.set && a.set != kNone) || a.cell[0] != b.cell[0] || a.cell[1] != b.cell[1] ||
+          a.cell[2] != b.cell[2])
         continue;
       const BoundingBox &u = boxes[a.box], &v = boxes[b.box];
       if (!u.overlaps(v))
@@ -98,14 +99,15 @@ void GridPairs::search(const std::vector<BoundingBox>& boxes, double inverse_siz
     }
 }
 
-const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBox>& boxes, int threads)
+const std::vector<GridPairs::Pair>& GridPairs::find(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets,
+                                                    int threads)
 {
   constexpr unsigned kShare = 1 << 13;   // A thread searches so many buckets at a time.
   pairs_.clear();
   if (boxes.size() < 2)
     return pairs_;
   const double inverse_size = 1.0 / cellSize(boxes);
-  fillBuckets(boxes, inverse_size);
+  fillBuckets(boxes, sets, inverse_size);
   const auto buckets = static_cast<unsigned>(bucket_start_.size()) - 1;
   const unsigned shares = (buckets + kShare - 1) / kShare;
   if (found_.size() < shares)

@@ -36,23 +36,26 @@ double contactShare(const ContactSegment& a, const ContactSegment& b, const Cont
 void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
                        const Motion& motion, const Range& range)
 {
-  const double gap = range.gap, margin = range.margin;
-  margin_ = margin;
+  const double gap = range.gap;
+  margin_ = range.margin;
   start_ = motion.x;
   way_ = motion.x_end - motion.x;
-  low_ = motion.x.cwiseMin(motion.x_end).array() - margin;
-  high_ = motion.x.cwiseMax(motion.x_end).array() + margin;
+  const Eigen::Map<const Eigen::RowVectorXd> margins(range.margins.data(), motion.x.cols());
+  low_ = motion.x.cwiseMin(motion.x_end).rowwise() - margins;
+  high_ = motion.x.cwiseMax(motion.x_end).rowwise() + margins;
   boxes_.resize(surface.segments.size());
+  sets_.resize(surface.segments.size());
   parallelFor(range.threads, static_cast<int>(boxes_.size()), 1024, [&](int i) {
     const ContactSegment& s = surface.segments[i];
     const double around = s.radius + 0.5 * gap;
     boxes_[i].low = low_.col(s.a).cwiseMin(low_.col(s.b)).array() - around;
     boxes_[i].high = high_.col(s.a).cwiseMax(high_.col(s.b)).array() + around;
+    sets_[i] = surface.objects[s.object].self ? GridPairs::kNone : s.object;
   });
   pairs_.clear();
   if (std::any_of(surface.objects.begin(), surface.objects.end(),
                   [](const ContactObject& o) { return o.self || o.others; }))
-    for (const GridPairs::Pair& p : grid_.find(boxes_, range.threads))
+    for (const GridPairs::Pair& p : grid_.find(boxes_, sets_, range.threads))
       if (mayMeet(surface, surface.segments[p.first], surface.segments[p.second], gap))
         pairs_.push_back(p);
   on_solids_.clear();
@@ -61,12 +64,12 @@ void Candidates::build(const ContactSurface& surface, const SheetPieces& sheets,
   turn_.resize(solids_.size());
   for (std::size_t k = 0; k < solids_.size(); ++k)
   {
-    shift_[k] = (motion.solids_end[k].position - solids_[k].position).norm() + margin;
+    shift_[k] = (motion.solids_end[k].position - solids_[k].position).norm() + margin_;
     turn_[k] = angleBetween(motion.solids_end[k], solids_[k]) + range.turn;
-    findOnSolid(surface, static_cast<int>(k), solids[k], motion, gap, margin);
+    findOnSolid(surface, static_cast<int>(k), solids[k], motion, range);
   }
   if (!sheets.empty())
-    sheets_.build(surface, sheets, solids, motion, {gap, margin, shift_, turn_});
+    sheets_.build(surface, sheets, solids, motion, {gap, margin_, shift_, turn_});
   has_triangles_ = !sheets.empty();
   built_ = true;
 }
@@ -95,35 +98,35 @@ bool Candidates::mayMeet(const ContactSurface& surface, const ContactSegment& a,
 }
 
 void Candidates::findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
-                             double gap, double margin)
+                             const Range& range)
 {
   const Pose& pose = solids_[solid];
   const ContactSolid& properties = surface.solids[solid];
-  const double reach = pieces.reach, corner = std::sqrt(3.0) * margin;
+  const double reach = pieces.reach, corner = std::sqrt(3.0);
   for (std::size_t i = 0; i < surface.segments.size(); ++i)
   {
     const ContactSegment& s = surface.segments[i];
     const Eigen::Vector3d a = motion.x.col(s.a) - pose.position, b = motion.x.col(s.b) - pose.position;
     const double moved = std::sqrt(std::max((motion.x_end.col(s.a) - motion.x.col(s.a)).squaredNorm(),
                                             (motion.x_end.col(s.b) - motion.x.col(s.b)).squaredNorm())) +
-                         corner;
+                         corner * std::max(range.margins[s.a], range.margins[s.b]);
     const double farthest = std::sqrt(std::max(a.squaredNorm(), b.squaredNorm())), half = 0.5 * (b - a).norm();
     // how far a point of the segment may come nearer, seen from the solid
     const double slack = moved + shift_[solid] + turn_[solid] * (farthest + moved + shift_[solid]);
-    const double range = gap + s.radius + slack;
+    const double most = range.gap + s.radius + slack;
     const Eigen::Vector3d middle = 0.5 * (a + b);
-    if (middle.norm() > reach + half + range || !mayTouch(surface, s, properties))
+    if (middle.norm() > reach + half + most || !mayTouch(surface, s, properties))
       continue;
     const Eigen::Quaterniond to_solid = pose.orientation.conjugate();
     if (pieces.tree.empty())
     {
-      if (pieceDistance(pieces.pieces[0], to_solid * middle).distance <= half + range)
+      if (pieceDistance(pieces.pieces[0], to_solid * middle).distance <= half + most)
         on_solids_.push_back({solid, static_cast<int>(i), 0});
       continue;
     }
     const Eigen::Vector3d za = to_solid * a, zb = to_solid * b;
     triangles_.clear();
-    pieces.tree[0].query({za.cwiseMin(zb).array() - range, za.cwiseMax(zb).array() + range}, triangles_);
+    pieces.tree[0].query({za.cwiseMin(zb).array() - most, za.cwiseMax(zb).array() + most}, triangles_);
     for (int triangle : triangles_)
       on_solids_.push_back({solid, static_cast<int>(i), triangle});
   }

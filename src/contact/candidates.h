@@ -19,16 +19,19 @@ public:
     int solid, segment, piece;
   };
   using Motion = SurfaceMotion;
+  /// Lengths are in m.
   struct Range
   {
-    double gap, margin;   ///< [m]
-    double turn;          ///< [rad]
-    int threads;          ///< that search for pairs; see parallelFor()
+    double gap;
+    double margin;                        ///< of triangles and solids
+    const std::vector<double>& margins;   ///< of points of curves; all are `margin` where there are triangles
+    double turn;                          ///< [rad]
+    int threads;                          ///< that search for pairs; see parallelFor()
   };
 
   /// Finds all pairs that may come within the gap of each other while all points are at one instant of the motion, but
   /// for at most the margin in each coordinate, and solids leave the motion by at most the margin and the turn.
-  /// Without triangles each point may be anywhere in the box of its own motion, enlarged by the margin.
+  /// Without triangles each point may be anywhere in the box of its own motion, enlarged by its margin.
   void build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
              const Motion& motion, const Range& range);
   /// Forgets everything: the surface has other pieces from now on.
@@ -48,7 +51,7 @@ public:
 private:
   bool mayMeet(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap) const;
   void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
-                   double gap, double margin);
+                   const Range& range);
 
   bool built_ = false, has_triangles_ = false;
   double margin_ = 0.0;
@@ -57,6 +60,7 @@ private:
   std::vector<Pose> solids_;
   std::vector<double> shift_, turn_;   ///< from solids_ up to which the candidates hold
   std::vector<BoundingBox> boxes_;
+  std::vector<int> sets_;   ///< of the boxes, see GridPairs
   GridPairs grid_;
   std::vector<GridPairs::Pair> pairs_;
   std::vector<OnSolid> on_solids_;

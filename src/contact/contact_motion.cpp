@@ -17,13 +17,26 @@ const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
       return *known;
   constexpr double kLongest = 10.0;   // gaps: after longer ways, evaluations would examine too many pairs
   constexpr double kOfSheets = 0.4;   // gaps: in a wider margin, triangles find too many of their neighbours
-  const double moved = (motion.x_end - motion.x).colwise().norm().maxCoeff();
-  margin_ = (sheets_.empty() ? std::clamp(2.0 * moved / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
-  Candidates& found = moved <= kLongest * options_.gap ? near_ : swept_;
-  const bool near = &found == &near_;
-  found.build(surface_, sheets_, solids_, motion,
-              {options_.gap, near ? margin_ : 0.0, near ? kTurnMargin : 0.0, threads_});
-  return found;
+  const auto marginOf = [&](double way) {
+    return (sheets_.empty() ? std::clamp(2.0 * way / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
+  };
+  double longest = 0.0, of_solids = 0.0;
+  for (std::size_t i = 0; i < margins_.size(); ++i)
+  {
+    const double way = (motion.x_end.col(i) - motion.x.col(i)).norm();
+    longest = std::max(longest, way);
+    margins_[i] = marginOf(way);
+  }
+  for (std::size_t k = 0; k < motion.solids.size(); ++k)
+    of_solids = std::max(of_solids, (motion.solids_end[k].position - motion.solids[k].position).norm());
+  margin_ = marginOf(of_solids);
+  if (longest <= kLongest * options_.gap)
+  {
+    near_.build(surface_, sheets_, solids_, motion, {options_.gap, margin_, margins_, kTurnMargin, threads_});
+    return near_;
+  }
+  swept_.build(surface_, sheets_, solids_, motion, {options_.gap, 0.0, no_margins_, 0.0, threads_});
+  return swept_;
 }
 
 ContactPotential::Meeting ContactPotential::meetingOf(const GridPairs::Pair& pair) const
@@ -232,7 +245,7 @@ bool ContactPotential::fit(std::vector<Thinned>& list, const std::array<int, 3>&
 bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   letPass(x, poses, x, poses);   // what presses on held points passes, also when the pieces are new
-  near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, {options_.gap, margin_, 0.0, threads_});
+  near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, {options_.gap, margin_, margins_, 0.0, threads_});
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
   for (const GridPairs::Pair& pair : near_.pairs())

@@ -44,7 +44,7 @@ class ContactPotential
 public:
   ContactPotential(ContactSurface surface, const ContactOptions& options);
   const ContactOptions& options() const { return options_; }
-  /// Threads for the pairs of large surfaces; 0: as OpenMP says. Results do not depend on it.
+  /// Threads for the pairs of large surfaces; 0: see parallelFor(). Results do not depend on it.
   void setThreads(int threads) { threads_ = threads; }
 
   /// Takes the points, segments, triangles, and objects of another surface, which must be sound; the solids stay. For
@@ -84,15 +84,19 @@ public:
   /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
   /// of a contact's force over the largest force.
   double lagFriction() { return lagFriction(0.0, false); }
+  /// A point of each contact whose friction the last lagFriction(), or the last evaluate(), changed by more than
+  /// kLagTolerance.
+  const std::vector<int>& pointsOfChanges() const { return points_of_changes_; }
   /// A change that lagFriction() returns is negligible if it is at most this [-].
   static constexpr double kLagTolerance = 1e-2;
   /// Tells how far the direction of an iteration moves the u of each term of terms() [m], after an evaluate() with
   /// stiffness. The next evaluate() with stiffness first gives friction the normal forces that the terms predict, to
   /// first order, for the end of the iteration. They are closer to the solution than those of the iterates, in which
-  /// gaps are too small or too large. Friction does not change if the change is negligible, or if a contact moves by
-  /// more than three times the smallest gap. A constant is added to the potential, so that the potential does not jump.
-  /// Friction follows a limited number of times after begin(), because a minimisation might not end otherwise.
-  /// beginSolution() forgets the directions before.
+  /// gaps are too small or too large. The friction of a contact does not change if the change is negligible, or if the
+  /// contact moves by more than three times the smallest gap. A constant is added to the potential, so that the
+  /// potential does not jump. pointsOfChanges() then names the contacts whose friction has changed. Friction follows a
+  /// limited number of times after begin(), because a minimisation might not end otherwise. beginSolution() forgets the
+  /// directions before.
   void followFriction(const std::vector<Eigen::Vector3d>& moves);
   /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
   /// threads have none, because their pieces change.
@@ -206,10 +210,13 @@ private:
   {
     std::int64_t first, second;   ///< of the contact
     double size;
+    bool far;   ///< It is not known, because the contact moves too far.
   };
 
   void beginFollowing();
   double lagFriction(double least, bool predicted);
+  void keepHistory(Contact& contact, const Contact& old, bool predicted) const;
+  void findSpring(Contact& contact) const;
   void relax(double change);
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
   /// How the points of an object have moved since begin() [m].
@@ -371,6 +378,8 @@ private:
   /// The change that lagFriction() without prediction returned last, and the share of the change of each force that
   /// the next call takes over.
   double last_change_ = kInfinity, relaxation_ = 1.0;
+  std::vector<std::pair<int, double>> changes_;   ///< points of contacts, and by how much forces change [N]
+  std::vector<int> points_of_changes_;
   std::vector<double> rubbed_;   ///< energies of friction, for addTerms() [J]
   double shift_ = 0.0;           ///< constant of the potential, see followFriction() [J]
   Candidates near_, swept_;
@@ -382,8 +391,9 @@ private:
   HeldPieces held_;
   std::vector<Displacements> displacements_;   ///< per object, see movedFar()
   std::vector<int> segment_of_point_;          ///< begins at a point, or ends there if none begins; -1: none
-  double margin_;
-  std::vector<int> order_;   ///< for clearance()
+  double margin_;                              ///< of candidates near solids and triangles [m]
+  std::vector<double> margins_, no_margins_;   ///< of candidates near points of curves [m]
+  std::vector<int> order_;                     ///< for clearance()
   std::vector<BoundingBox> boxes_;
 };
 

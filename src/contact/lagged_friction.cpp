@@ -37,6 +37,13 @@ double turnAbout(const Eigen::Vector3d& axis, const Pose& from, const Pose& to)
   return sine > 0.0 ? 2.0 * std::atan2(sine, turn.w()) * axis.dot(turn.vec()) / sine : 0.0;
 }
 
+/// The order of contacts.
+template <class A, class B>
+bool comesBefore(const A& a, const B& b)
+{
+  return a.first != b.first ? a.first < b.first : a.second < b.second;
+}
+
 }   // namespace
 
 bool operator<(const FrictionSpring& a, const FrictionSpring& b)
@@ -136,15 +143,14 @@ void ContactPotential::beginFollowing()
 void ContactPotential::followFriction(const std::vector<Eigen::Vector3d>& moves)
 {
   constexpr double kFar = 3.0;   // smallest gaps: the change of a force is not linear over such distances
-  following_ = std::all_of(moves.begin(), moves.end(),
-                           [&](const Eigen::Vector3d& u) { return u.norm() < kFar * smallest_gap_; });
+  following_ = true;
   predicted_.clear();
   // The normal terms come first, in the order of the contacts.
-  for (std::size_t k = 0; following_ && k < found_.contacts.size(); ++k)
+  for (std::size_t k = 0; k < found_.contacts.size(); ++k)
   {
     const Contact& c = found_.contacts[k];
     const double size = c.force.norm(), change = -c.force.normalized().dot(found_.terms[k].stiffness * moves[k]);
-    predicted_.push_back({c.first, c.second, std::max(0.0, size + change)});
+    predicted_.push_back({c.first, c.second, std::max(0.0, size + change), moves[k].norm() >= kFar * smallest_gap_});
   }
 }
 
@@ -175,76 +181,99 @@ double ContactPotential::addTerms(const Place& place, const Eigen::VectorXd* tur
 }
 
 /// Does not take the new forces over if they have changed by less than `least`. `predicted`: instead of present normal
-/// forces it takes the predicted ones of the same contacts.
+/// forces it takes the predicted ones of the same contacts, each of them if it has changed.
 double ContactPotential::lagFriction(double least, bool predicted)
 {
-  const auto comes_before = [](const auto& a, const auto& b) {
-    return a.first != b.first ? a.first < b.first : a.second < b.second;
-  };
-  double change = 0.0, largest = 0.0;
+  double largest = 0.0;
+  for (const auto* list : {&lagged_, &found_.contacts})
+    for (const Contact& contact : *list)
+      largest = std::max(largest, frictionOf(contact) > 0.0 ? contact.force.norm() : 0.0);
   auto old = lagged_.begin();
   auto before = predicted_.begin();
   rubbing_.clear();
+  changes_.clear();
+  const auto isOld = [&](const Contact& contact) {
+    for (; old != lagged_.end() && comesBefore(*old, contact); ++old)
+      changes_.emplace_back(old->point[0], old->force.norm());
+    return old != lagged_.end() && !comesBefore(contact, *old);
+  };
   for (const Contact& present : found_.contacts)
   {
-    const double friction = frictionOf(present);
-    if (!(friction > 0.0))
+    if (!(frictionOf(present) > 0.0))
       continue;
     if (predicted)
     {
-      before = std::find_if(before, predicted_.end(), [&](const auto& p) { return !comes_before(p, present); });
-      if (before == predicted_.end() || comes_before(present, *before))
+      before = std::find_if(before, predicted_.end(), [&](const auto& p) { return !comesBefore(p, present); });
+      if (before == predicted_.end() || comesBefore(present, *before))
         continue;
     }
-    Contact& contact = rubbing_.emplace_back(present);
-    contact.friction = friction;
+    Contact contact = present;
+    contact.friction = frictionOf(present);
     if (predicted)
       contact.force = before->size * present.force.normalized();
-    for (; old != lagged_.end() && comes_before(*old, contact); ++old)
-      change = std::max(change, old->force.norm());
-    const bool same = old != lagged_.end() && !comes_before(contact, *old);
-    change = std::max(change, (same ? Eigen::Vector3d(contact.force - old->force) : contact.force).norm());
-    largest = std::max(largest, contact.force.norm());
-    if (same && predicted)
+    const bool same = isOld(present);
+    const double change = same ? (contact.force - old->force).norm() : contact.force.norm();
+    if (predicted && same && (before->far || change <= kLagTolerance * largest))
     {
-      // It stays where it was. If the material points that touch were taken from an iterate, they would have moved
-      // apart by the end of the step, and what turns with a solid would creep.
-      const Eigen::Vector3d force = contact.force;
-      contact = *old++;
-      contact.force = force;
+      rubbing_.push_back(*old++);
+      continue;
     }
-    else if (same)
-    {
-      contact.force = old->force + relaxation_ * (contact.force - old->force);
-      contact.has_iterate = old->has_iterate;
-      contact.last_slip = old->last_slip;
-      contact.last_force = old->last_force;
-      contact.last_stiffness = old->last_stiffness;
-      contact.tension_begin = old->tension_begin;
-      contact.tension = old->tension;
-      ++old;
-    }
-    else if (!springs_.empty())
-    {
-      const FrictionSpring wanted = springOf(contact);
-      const auto spring = std::lower_bound(springs_.begin(), springs_.end(), wanted);
-      if (spring != springs_.end() && !(wanted < *spring))
-        contact.tension = contact.tension_begin = spring->tension;
-    }
+    if (predicted && before->far)
+      continue;
+    changes_.emplace_back(contact.point[0], change);
+    same ? keepHistory(contact, *old++, predicted) : findSpring(contact);
     if (!same || !predicted)
       setLevers(contact);
+    rubbing_.push_back(contact);
   }
   for (; old != lagged_.end(); ++old)
-    change = std::max(change, old->force.norm());
-  for (const Contact& contact : lagged_)
-    largest = std::max(largest, contact.force.norm());
-  const double share = largest > 0.0 ? change / largest : 0.0;
+    changes_.emplace_back(old->point[0], old->force.norm());
+  double share = 0.0;
+  points_of_changes_.clear();
+  for (const auto& [point, change] : changes_)
+  {
+    share = std::max(share, largest > 0.0 ? change / largest : 0.0);
+    if (change > kLagTolerance * largest)
+      points_of_changes_.push_back(point);
+  }
   shift_ = 0.0;
   if (!predicted)
     relax(share);
   if (share >= least)
     lagged_.swap(rubbing_);
   return share;
+}
+
+/// A contact that had friction before, `old`, keeps its history. `predicted`: see lagFriction().
+void ContactPotential::keepHistory(Contact& contact, const Contact& old, bool predicted) const
+{
+  if (predicted)
+  {
+    // It stays where it was. If the material points that touch were taken from an iterate, they would have moved
+    // apart by the end of the step, and what turns with a solid would creep.
+    const Eigen::Vector3d force = contact.force;
+    contact = old;
+    contact.force = force;
+    return;
+  }
+  contact.force = old.force + relaxation_ * (contact.force - old.force);
+  contact.has_iterate = old.has_iterate;
+  contact.last_slip = old.last_slip;
+  contact.last_force = old.last_force;
+  contact.last_stiffness = old.last_stiffness;
+  contact.tension_begin = old.tension_begin;
+  contact.tension = old.tension;
+}
+
+/// A contact that is new takes the tension of its spring, if it has one.
+void ContactPotential::findSpring(Contact& contact) const
+{
+  if (springs_.empty())
+    return;
+  const FrictionSpring wanted = springOf(contact);
+  const auto spring = std::lower_bound(springs_.begin(), springs_.end(), wanted);
+  if (spring != springs_.end() && !(wanted < *spring))
+    contact.tension = contact.tension_begin = spring->tension;
 }
 
 /// Solutions with lagged friction may alternate between two states. If the change of the forces hardly becomes smaller,

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <algorithm>
-#include <numeric>
 #include <vector>
+
+#include "linalg/disjoint_sets.h"
 
 namespace slender {
 
@@ -20,9 +21,8 @@ public:
   void begin(int movers, bool prescribed_moves)
   {
     prescribed_moves_ = prescribed_moves;
-    parent_.resize(static_cast<std::size_t>(movers) + 1);
-    std::iota(parent_.begin(), parent_.end(), 0);
-    share_.assign(parent_.size(), 1.0);
+    groups_.begin(movers + 1);
+    share_.assign(static_cast<std::size_t>(movers) + 1, 1.0);
   }
   /// What does not move is never united with others or limited.
   bool moves(int mover) const { return mover == kPrescribed ? prescribed_moves_ : mover != kFixed; }
@@ -31,14 +31,13 @@ public:
   {
     if (!moves(a) || !moves(b))
       return;
-    const int one = shorten(a), other = shorten(b), from = std::max(one, other), to = std::min(one, other);
-    parent_[from] = to;   // The ways to groups stay short if movers come in the order of a chain.
-    share_[to] = std::min(share_[to], share_[from]);
+    const double share = std::min(of(a), of(b));
+    share_[groups_.unite(index(a), index(b))] = share;
   }
   void uniteAll()
   {
-    for (std::size_t k = 0; k + 1 < parent_.size(); ++k)
-      unite(static_cast<int>(k), k == 0 ? kPrescribed : 0);
+    for (int k = 0; k + 1 < groups_.count(); ++k)
+      unite(k, k == 0 ? kPrescribed : 0);
   }
   /// The group of the mover goes no more than this share.
   void limit(int mover, double share)
@@ -57,34 +56,20 @@ public:
   bool differ() const
   {
     const double first = of(0);
-    for (std::size_t k = 1; k + 1 < parent_.size(); ++k)
-      if (of(static_cast<int>(k)) != first)
+    for (int k = 1; k + 1 < groups_.count(); ++k)
+      if (of(k) != first)
         return true;
     return prescribed_moves_ && of(kPrescribed) != first;
   }
   double least() const { return *std::min_element(share_.begin(), share_.end()); }
 
 private:
-  int index(int mover) const { return mover == kPrescribed ? static_cast<int>(parent_.size()) - 1 : mover; }
-  int groupOf(int mover) const
-  {
-    int k = index(mover);
-    while (parent_[k] != k)
-      k = parent_[k];
-    return k;
-  }
-  /// Returns the group, and halves the way to it.
-  int shorten(int mover)
-  {
-    int k = index(mover);
-    while (parent_[k] != k)
-      k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
+  int index(int mover) const { return mover == kPrescribed ? groups_.count() - 1 : mover; }
+  int groupOf(int mover) const { return groups_.of(index(mover)); }
 
   bool prescribed_moves_ = false;
-  std::vector<int> parent_;     ///< of movers; the last one is kPrescribed
-  std::vector<double> share_;   ///< per mover, of its group if it has no parent
+  DisjointSets groups_;         ///< of movers; the last one is kPrescribed
+  std::vector<double> share_;   ///< of the groups that have these names
 };
 
 }   // namespace slender

@@ -21,6 +21,8 @@ enum class Approach
 /// resolve.
 inline double fineTolerance(const NewtonConfig& newton, double gap) { return std::max(newton.tolerance, 1e-3 * gap); }
 
+constexpr double kFineGap = 1e-3;   ///< of the smallest gap: motion at contacts where a solution ends
+
 /// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a
 /// time step to `to`. They advance until contact blocks them; a solution lets the blocking parts give way; and so on.
 /// Then it solves at `to`, with friction forces from the previous solution, until these no longer change. `gap` is the
@@ -32,6 +34,7 @@ inline double fineTolerance(const NewtonConfig& newton, double gap) { return std
 /// - pushes(): whether something that is driven moves;
 /// - advance(to): puts what is held or driven, in the trial, where it is at `to`, and moves along what is pushed;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
+/// - lagFriction() and stiffen(converged): as those of ContactPotential;
 /// - contact(): the ContactPotential.
 template <class System>
 NewtonResult minimizeConfined(System& system, double from, double to, const NewtonConfig& newton, double gap)
@@ -82,7 +85,7 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     // already pushed them along.
     const bool is_quick = pushes && k < kQuickAdvances;
     if (!is_quick || reached - from < kFarAdvance * way)
-      system.contact()->stiffen(is_quick ? solve(quick, 1.0) : solve(loose, 0.1));
+      system.stiffen(is_quick ? solve(quick, 1.0) : solve(loose, 0.1));
     if (total.failure == StepFailure::work_exceeded)
       return total;
     system.accept();
@@ -92,16 +95,16 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   }
   for (int k = 0, failures = 0;; ++k)
   {
-    const bool good = solve(fine, 1e-3);
+    const bool good = solve(fine, kFineGap);
     if (stepsInterrupted())
     {
       total.failure = StepFailure::interrupted;
       return total;
     }
-    const bool changed = system.contact()->stiffen(good);
+    const bool changed = system.stiffen(good);
     if (!good && !(changed && ++failures <= kMaxFailures))
       return total;
-    if (good && !changed && (system.contact()->lagFriction() <= ContactPotential::kLagTolerance || k >= kMaxSolutions))
+    if (good && !changed && (system.lagFriction() <= ContactPotential::kLagTolerance || k >= kMaxSolutions))
       return total;
     system.accept();
   }

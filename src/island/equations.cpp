@@ -8,6 +8,14 @@
 
 namespace slender {
 
+namespace {
+
+/// Largest motion of contacts that stick at which a solution may end, of the range in which friction sticks. The
+/// increment after it is far smaller.
+constexpr double kStick = 0.3;
+
+}   // namespace
+
 // ---- what the island consists of
 
 void Equations::setParts(const std::vector<Part*>& parts)
@@ -71,9 +79,15 @@ void Equations::placeSolids(double fraction, std::vector<Pose>& poses) const
       poses[k] = poseBetween(s.start, s.start_velocity, s.target, duration_, fraction, nullptr) * s.X_BS;
 }
 
+/// Settled parts are where they were in the last evaluation.
 void Equations::gather(Eigen::Matrix3Xd& x, std::vector<Pose>& poses) const
 {
-  forAllParts([&](const Part& part) { part.gather(x); });
+  forAllParts([&](const Part& part) {
+    if (!part.settled)
+      part.gather(x);
+    else if (&x != &points_)
+      x.middleCols(part.first_point, part.points()) = points_.middleCols(part.first_point, part.points());
+  });
   gatherSolids(poses);
 }
 
@@ -113,22 +127,90 @@ void Equations::unsettle()
   }
 }
 
-/// A part settles if its last increment was a full one of Newton's method and within the tolerance at which a solution
-/// ends, because the next increment would be far smaller. Threads never settle: small increments do not tell that their
-/// forces are balanced.
+/// Groups of parts settle if their last increments were full ones of Newton's method and within the tolerance at which
+/// a solution ends, because the next increments would be far smaller. Threads never settle: small increments do not
+/// tell that their forces are balanced.
 void Equations::settle()
 {
-  const bool may_settle = moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced);
-  forAllParts([&](Part& part) {
-    if (may_settle && !part.settled && isAlone(part) && shares_.of(part.number) == 1.0 && part.increment <= arrived_ &&
-        part.evaluation.inertia.positiveDefinite())
-    {
+  if (moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced))
+  {
+    group_moves_.assign(parts_.size(), false);
+    for (const Part* part : parts_)
+      if (!part->settled && !mayLeave(*part))
+        group_moves_[groups_.of(part->number)] = true;
+    forParts([&](Part& part) {
+      if (group_moves_[groups_.of(part.number)])
+        return;
       part.settled = true;
       part.moveAlong(0.0);   // makes the trial complete, which remains the one that others see
       part.evaluate(false, {});
+    });
+  }
+  if (std::getenv("SLENDER_DBG"))
+  {
+    int c = 0, cs = 0, o = 0, os = 0, a = 0, as = 0;
+    for (Part* p : parts_)
+    {
+      (p->coupled ? c : p->own_terms.empty() ? a : o)++;
+      if (p->settled)
+        (p->coupled ? cs : p->own_terms.empty() ? as : os)++;
     }
-    part.increment = kInfinity;
-  });
+    std::printf("SETTLE full %d newton %d coupled %d/%d own %d/%d alone %d/%d\n", moved_fully_, by_newton_, cs, c, os,
+                o, as, a);
+  }   // DBG
+  for (Part* part : parts_)
+    part->increment = kInfinity;
+}
+
+/// Returns whether the part may settle as soon as its group may.
+bool Equations::mayLeave(const Part& part) const
+{
+  if (part.coupled ? anyAverages() || matrix_.solver() == SharedMatrix::Solver::sweeps
+                   : !part.evaluation.inertia.positiveDefinite())
+    return false;   // Sweeps and averages solve for all coupled parts together.
+  return shares_.of(part.number) == 1.0 && part.increment <= arrived_ && part.moved_sticking <= kStick &&
+         part.moved_at_contact <= kFineGap * contact_->smallestGap();
+}
+
+/// The parts of these points move on.
+void Equations::wake(const std::vector<int>& points)
+{
+  for (const int point : points)
+    partOf(point).settled = false;
+}
+
+/// All parts of a group move as long as one of them does.
+void Equations::wakeGroups()
+{
+  group_moves_.assign(parts_.size(), false);
+  for (const Part* part : parts_)
+    if (!part->settled)
+      group_moves_[groups_.of(part->number)] = true;
+  for (Part* part : parts_)
+    part->settled = part->settled && !group_moves_[groups_.of(part->number)];
+}
+
+void Equations::setExact(bool exact)
+{
+  exact_ = exact;
+  unsettle();
+}
+
+/// Takes over the present normal forces for friction. Groups in which they have changed move on.
+double Equations::lagFriction()
+{
+  const double change = contact_->lagFriction();
+  wake(contact_->pointsOfChanges());
+  return change;
+}
+
+/// Makes barriers stiffer where they have to be.
+bool Equations::stiffen(bool converged)
+{
+  const bool changed = contact_->stiffen(converged);
+  if (changed)
+    unsettle();
+  return changed;
 }
 
 bool Equations::moves(const IslandSolid& s)
@@ -213,7 +295,13 @@ NewtonResult Equations::solve(double from, double to, const NewtonConfig& newton
   contact_->letPass(points_base_, poses_base_, points_end_, poses_end_);
   const double gap = contact_->options().gap / tolerances.least_edge;
   arrived_ = fineTolerance(newton, gap);
-  return minimizeConfined(*this, from, to, newton, gap);
+  const NewtonResult result = minimizeConfined(*this, from, to, newton, gap);
+  if (std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->settled && !isAlone(*part); }))
+  {
+    unsettle();
+    evaluate(false);   // adds what others exert on them to the gradients of parts that have settled
+  }
+  return result;
 }
 
 void Equations::endStage()
@@ -356,19 +444,19 @@ double Equations::stepLimit()
 
 double Equations::incrementSize()
 {
-  constexpr double kStick = 0.3;   // of the range in which friction sticks; the increment after is far smaller
-  double largest = 0.0;
+  double largest = 0.0, at_contact = 0.0;
   for (Part* part : parts_)
     if (!part->settled)
     {
       part->increment = part->incrementSize(tolerances.least_edge);
       largest = std::max(largest, part->increment);
+      at_contact = std::max(at_contact, part->moved_at_contact);
     }
   if (!contact_)
     return largest;
   // A barrier is resolved when its gaps are, and friction that sticks when the stretch of its springs is.
-  if (moved_at_contact_ > 0.0)
-    largest = std::max(largest, tolerance_ * moved_at_contact_ / (gap_tolerance_ * contact_->smallestGap()));
+  if (at_contact > 0.0)
+    largest = std::max(largest, tolerance_ * at_contact / (gap_tolerance_ * contact_->smallestGap()));
   return std::max(largest, tolerance_ * moved_sticking_ / kStick);
 }
 
@@ -384,10 +472,18 @@ bool Equations::sticksAfter(double rate) const
 void Equations::measureContacts()
 {
   moves_.clear();
-  double at_contact = 0.0, sticking = 0.0;
+  moved_sticking_ = 0.0;
+  for (Part* part : parts_)
+    part->moved_at_contact = part->moved_sticking = 0.0;
   for (const ContactTerm& term : contact_->terms())
   {
     Eigen::Vector3d u = Eigen::Vector3d::Zero();
+    Part& first = partOf(term.point[0]);
+    if (first.settled)
+    {
+      moves_.push_back(u);
+      continue;
+    }
     for (int p = 0; p < 4 && !term.carried; ++p)
       if (term.point[p] >= 0)
         u += term.moveBy(p, partOf(term.point[p]).move(term.point[p] - partOf(term.point[p]).first_point));
@@ -397,12 +493,11 @@ void Equations::measureContacts()
       u -= body->moveAt(term.position);
     forTurns(term, [&](Part& part, int point, const Eigen::Vector3d& column) { u += part.moveTurn(point) * column; });
     moves_.push_back(u);
-    at_contact = std::max(at_contact, u.norm());
+    first.moved_at_contact = std::max(first.moved_at_contact, u.norm());
     if (term.slip_range > 0.0)
-      sticking = std::max(sticking, u.norm() / term.slip_range);
+      first.moved_sticking = std::max(first.moved_sticking, u.norm() / term.slip_range);
+    moved_sticking_ = std::max(moved_sticking_, first.moved_sticking);
   }
-  moved_at_contact_ = at_contact;
-  moved_sticking_ = sticking;
   contact_->followFriction(moves_);
 }
 

@@ -61,7 +61,7 @@ public:
   void setContact(ContactSurface surface, const ContactOptions& options);
   /// A potential of the surface points besides contact; null: none.
   void setAttraction(SurfacePotential* attraction) { attraction_ = attraction; }
-  /// Sets how many threads evaluate parts and contact and factor the shared matrix. With 0 OpenMP chooses their number.
+  /// Sets how many threads evaluate parts and contact and factor the shared matrix. 0: see parallelFor().
   void setThreads(int threads);
   ContactPotential* contact() { return contact_.get(); }   ///< null: nothing touches
   const ContactPotential* contact() const { return contact_.get(); }
@@ -89,7 +89,7 @@ public:
 
   // ---- for the stability of an equilibrium
   /// From now on all contacts couple, and only the exact matrix is factored.
-  void setExact(bool exact) { exact_ = exact; }
+  void setExact(bool exact);
   /// Puts what is prescribed, and what follows it, where it is at this fraction.
   void place(double fraction);
   RodEvaluation evaluate(bool with_hessian, const HessianShift& shift = {});
@@ -125,6 +125,8 @@ private:
   bool pushes() const { return solidsMove(); }
   void advance(double to);
   void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
+  double lagFriction();
+  bool stiffen(bool converged);
 
   /// Four points and a solid of a contact that couples unknowns, and the segments that it turns.
   using Key = std::array<int, 7>;
@@ -148,6 +150,9 @@ private:
   static bool isAlone(const Part& part) { return !part.coupled && part.own_terms.empty(); }
   void unsettle();
   void settle();
+  void wake(const std::vector<int>& points);
+  void wakeGroups();
+  bool mayLeave(const Part& part) const;
   void uniteCoupled();
   void limitShares();
   void countPoints();
@@ -162,6 +167,7 @@ private:
   void takeNewKeys();
   void buildPattern();
   void noteParts();
+  void findGroups();
   SharedMatrix::Solver chooseSolver();
   bool sweepsPay();
   SharedMatrix::Bases basesOf(const int (&point)[4]) const;
@@ -207,14 +213,15 @@ private:
   MotionShares shares_;
   double least_share_ = 1.0;   ///< least share of the direction that a part goes; set by stepLimit()
   double arrived_ = 0.0;       ///< largest increment of a part that may settle [-]
+  /// Parts that contacts or joints connect, or have connected since the pattern of the matrix was begun.
+  DisjointSets groups_;
+  std::vector<char> group_moves_;   ///< of the groups that have these names: a part of it is not settled
   /// The last direction was computed without a shift, and parts that met nothing went all of it.
   bool by_newton_ = false, moved_fully_ = false;
   bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
-  /// Largest relative motion of touching surfaces by the direction: of all contacts [m], and of contacts that stick, as
-  /// a fraction of the stretch at which they slip [-].
-  double moved_at_contact_ = 0, moved_sticking_ = 0;
+  double moved_sticking_ = 0;            ///< the largest Part::moved_sticking
   std::vector<Eigen::Vector3d> moves_;   ///< of contacts by the direction [m]
 };
 

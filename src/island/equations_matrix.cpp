@@ -169,6 +169,7 @@ void Equations::noteParts()
     if (RigidPart* body = bodyOf(key[4]))
       body->coupled = true;
   }
+  findGroups();
   const bool same = std::equal(parts_.begin(), parts_.end(), coupled_.begin(),
                                [](const Part* part, char coupled) { return part->coupled == (coupled != 0); });
   if (parts_valid_ && same)
@@ -188,6 +189,27 @@ void Equations::noteParts()
       part->notePattern(matrix_);
   matrix_.keepNoted();
   parts_valid_ = true;
+}
+
+void Equations::findGroups()
+{
+  groups_.begin(static_cast<int>(parts_.size()));
+  const Part* joined = nullptr;
+  for (const Part* part : parts_)
+    if (part->joined())
+    {
+      groups_.unite(part->number, (joined ? joined : part)->number);
+      joined = part;
+    }
+  for (const Key& key : keys_)
+  {
+    const int first = partOf(key[0]).number;
+    for (int p = 1; p < 4; ++p)
+      if (key[p] >= 0)
+        groups_.unite(first, partOf(key[p]).number);
+    if (const RigidPart* body = bodyOf(key[4]))
+      groups_.unite(first, body->number);
+  }
 }
 
 void Equations::buildPattern()
@@ -247,12 +269,12 @@ bool Equations::sweepsPay()
 void Equations::assemble(const HessianShift& shift, bool whole)
 {
   matrix_.clear();
-  forAllParts([&](Part& part) {
+  forParts([&](Part& part) {
     if (part.coupled && !part.joined())
       part.addHessian(matrix_, shift);
   });
   for (Part* part : parts_)   // Joints add to entries of both parts.
-    if (part->coupled && part->joined())
+    if (part->coupled && part->joined() && !part->settled)
       part->addHessian(matrix_, shift);
   if (!contact_)
     return;
@@ -264,7 +286,7 @@ void Equations::assemble(const HessianShift& shift, bool whole)
     while (row < end && row - first < SharedMatrix::kMostRows && row->solid == term.solid &&
            std::equal(row->point, row->point + 4, term.point))
       ++row;
-    if (partOf(term.point[0]).coupled)
+    if (const Part& part = partOf(term.point[0]); part.coupled && !part.settled)
       addTerm(term, first, static_cast<int>(row - first), whole);
   });
 }
@@ -292,7 +314,10 @@ bool Equations::factor(const HessianShift& shift)
 {
   for (const Part* part : parts_)
     if (part->coupled)
+    {
+      matrix_.setIdle(part->offset, part->unknowns(), part->settled);
       part->takeGradient(matrix_.solution());
+    }
   const auto assembled = [&](bool whole) { assemble(shift, whole); };
   return exact_ ? matrix_.factorExactly(assembled) : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
 }
@@ -305,8 +330,10 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   if (contact_)
   {
     gather(points_, poses_);
-    forAllParts([&](const Part& part) { part.gatherTurns(turns_); });
-    turns_ -= turns_begin_;
+    forParts([&](const Part& part) {
+      part.gatherTurns(turns_);
+      turns_.segment(part.first_point, part.points()) -= turns_begin_.segment(part.first_point, part.points());
+    });
     sum.potential = contact_->evaluate(points_, poses_, with_hessian, &turns_);
     if (!std::isfinite(sum.potential))
       return sum;
@@ -315,11 +342,11 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
     if (attraction_)
       sum.potential += attraction_->evaluate(points_, with_hessian);
     take();
+    wake(contact_->pointsOfChanges());
   }
   if (!parts_valid_ || !keys_valid_)
     buildPattern();
-  for (Part* part : parts_)
-    part->settled = part->settled && isAlone(*part);
+  wakeGroups();
   forParts([&](Part& part) { part.evaluate(with_hessian, shift); });
   for (const Part* part : parts_)
   {
@@ -336,13 +363,14 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
     }
   }
   forTerms([&](const ContactTerm& term) {
-    if (!isOwn(term) || partOf(term.point[0]).coupled)
+    if (const Part& part = partOf(term.point[0]); !part.settled && (part.coupled || !isOwn(term)))
       addForce(term);
   });
   for (Part* part : parts_)
-    part->passGradient();
+    if (!part->settled)
+      part->passGradient();
   for (Part* part : parts_)
-    if (part->coupled)
+    if (part->coupled && !part->settled)
       part->closeGradient();
   if (with_hessian && matrix_.unknowns() > 0)
     sum.inertia.negative += !factor(shift);

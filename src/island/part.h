@@ -24,13 +24,16 @@ struct PartInIsland
   const void* island = nullptr;   ///< in which the part was stepped last
   bool coupled = false;           ///< the matrix of the island has its unknowns
   int offset = 0;                 ///< number of its first unknown in that matrix
-  /// Newton's method has converged for the part, and nothing couples or touches it. It is neither evaluated nor moved
-  /// until something comes near, or what is prescribed moves.
+  /// Newton's method has converged for the part and for all parts that contacts or joints connect to it. It is neither
+  /// evaluated nor moved until its contacts change, another part meets it, or what is prescribed moves.
   bool settled = false;
   bool has_direction = true;   ///< of the present iteration; none: it was settled when directions were computed
   double increment = 0.0;      ///< incrementSize() of the present direction
-  int number = 0;              ///< among the parts of the island
-  int first_point = 0;         ///< number of its first surface point among those of the island
+  /// Largest relative motion of surfaces that touch the part, by the present direction: of all contacts [m], and of
+  /// contacts that stick, as a fraction of the stretch at which they slip [-]. Each contact counts for one part.
+  double moved_at_contact = 0.0, moved_sticking = 0.0;
+  int number = 0;                              ///< among the parts of the island
+  int first_point = 0;                         ///< number of its first surface point among those of the island
   std::vector<const ContactTerm*> own_terms;   ///< present contacts that the part's own matrix has room for
   std::vector<const ContactRow*> own_rows;     ///< likewise
   RodEvaluation evaluation;                    ///< result of the last evaluate()

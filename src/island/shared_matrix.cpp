@@ -133,6 +133,7 @@ void SharedMatrix::finish(Solver solver, const std::vector<char>& turns)
     starts_.push_back(static_cast<int>(rows_.size()));
   }
   values_.assign(rows_.size(), 0.0);
+  idle_.assign(static_cast<std::size_t>(unknowns_), false);
   if (solver_ != Solver::sweeps)
     return;
   if (!sweeps_)
@@ -176,7 +177,7 @@ bool SharedMatrix::factorDirectly()
   if (!cholesky_known_)
     cholesky_.setPattern(starts_, rows_);
   cholesky_known_ = true;
-  return cholesky_.factor(values_, threads_);
+  return cholesky_.factor(values_, idle_, threads_);
 }
 
 void SharedMatrix::solve()

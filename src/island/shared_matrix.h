@@ -105,6 +105,10 @@ public:
   /// The same for a term that turns segments and has no rows; `turns`: the unknowns of their turns, negative: none.
   void addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns);
 
+  /// Leaves unknowns out of factor() and solve() until the next finish(), or takes them in again. Either all unknowns
+  /// of a component of the matrix are idle, or none. Sweeps cannot leave unknowns out.
+  void setIdle(int first, int count, bool idle) { std::fill_n(idle_.begin() + first, count, idle); }
+
   /// Forgets that factorisations with whole second derivatives, or sweeps, have failed.
   void beginStage() { whole_ = swept_ = {}; }
   /// Factors what assemble(whole) makes: with the contacts' whole second derivatives where `contacts` says that there
@@ -171,6 +175,7 @@ private:
   std::vector<int> starts_, rows_;               ///< lower triangle by columns, as SparseCholesky has it
   std::vector<double> values_;
   std::vector<double> solution_;
+  std::vector<char> idle_;   ///< per unknown
   Solver solver_ = Solver::cholesky;
 
   int threads_ = 1;

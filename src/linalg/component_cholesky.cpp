@@ -1,7 +1,6 @@
 #include "component_cholesky.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "parallel_for.h"
 
@@ -11,32 +10,22 @@ namespace slender {
 void ComponentCholesky::findComponents(const std::vector<int>& starts, const std::vector<int>& rows)
 {
   const int n = static_cast<int>(starts.size()) - 1;
-  // Each unknown names an earlier one of its component. The first unknown of a component names itself.
-  std::vector<int> before(n);
-  std::iota(before.begin(), before.end(), 0);
-  const auto first = [&](int u) {
-    while (before[u] != u)
-      u = before[u] = before[before[u]];
-    return u;
-  };
+  sets_.begin(n);
   for (int j = 0; j < n; ++j)
     for (int k = starts[j]; k < starts[j + 1]; ++k)
-    {
-      const int a = first(j), b = first(rows[k]);
-      before[std::max(a, b)] = std::min(a, b);
-    }
+      sets_.unite(j, rows[k]);
   components_.clear();
   component_of_.resize(n);
   number_.resize(n);
   for (int u = 0; u < n; ++u)
   {
-    if (before[u] == u)
+    if (const int first = sets_.of(u); first != u)
+      component_of_[u] = component_of_[first];
+    else
     {
       component_of_[u] = static_cast<int>(components_.size());
       components_.emplace_back();
     }
-    else
-      component_of_[u] = component_of_[before[u]];
     std::vector<int>& unknowns = components_[component_of_[u]].unknowns;
     number_[u] = static_cast<int>(unknowns.size());
     unknowns.push_back(u);
@@ -89,22 +78,27 @@ void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::ve
   known_.clear();
 }
 
-bool ComponentCholesky::factor(const std::vector<double>& values, int threads)
+bool ComponentCholesky::factor(const std::vector<double>& values, const std::vector<char>& idle, int threads)
 {
   parallelFor(threads, static_cast<int>(components_.size()), 1, [&](int n) {
     Component& component = components_[n];
+    component.idle = idle[component.unknowns.front()];
+    if (component.idle)
+      return;
     double* own = component.cholesky->values();
     for (std::size_t k = 0; k < component.entries.size(); ++k)
       own[k] = values[component.entries[k]];
     component.definite = component.cholesky->factor();
   });
-  return std::all_of(components_.begin(), components_.end(), [](const Component& c) { return c.definite; });
+  return std::all_of(components_.begin(), components_.end(), [](const Component& c) { return c.idle || c.definite; });
 }
 
 void ComponentCholesky::solve(double* x, int threads)
 {
   parallelFor(threads, static_cast<int>(components_.size()), 1, [&](int n) {
     Component& component = components_[n];
+    if (component.idle)
+      return;
     for (std::size_t k = 0; k < component.unknowns.size(); ++k)
       component.x[k] = x[component.unknowns[k]];
     component.cholesky->solve(component.x.data());

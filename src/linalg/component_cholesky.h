@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "disjoint_sets.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 namespace slender {
@@ -21,9 +22,10 @@ public:
 
   /// Takes the lower triangle by columns, in the form of SparseCholesky::setPattern().
   void setPattern(const std::vector<int>& starts, const std::vector<int>& rows);
-  /// Returns whether the matrix is positive definite. `values` has one value per entry of the pattern. `threads`: see
+  /// Returns whether the matrix is positive definite. `values` has one value per entry of the pattern. Components whose
+  /// first unknown is `idle`, of which there is one entry per unknown, are left out, also by solve(). `threads`: see
   /// parallelFor().
-  bool factor(const std::vector<double>& values, int threads);
+  bool factor(const std::vector<double>& values, const std::vector<char>& idle, int threads);
   /// x := A^-1 x after a factor() that returned true.
   void solve(double* x, int threads);
 
@@ -34,7 +36,7 @@ private:
     std::vector<int> starts, rows;        ///< the pattern, in the numbers of the component
     std::vector<double> x;                ///< work space of solve()
     std::uint64_t hash = 0;               ///< of the pattern
-    bool definite = false;
+    bool idle = false, definite = false;
     std::optional<SparseCholesky> cholesky;
   };
   void findComponents(const std::vector<int>& starts, const std::vector<int>& rows);
@@ -43,7 +45,8 @@ private:
   const bool simplicial_;
   std::vector<Component> components_;
   std::unordered_multimap<std::uint64_t, Component> known_;   ///< components of the previous pattern, by their hashes
-  std::vector<int> component_of_, number_;                    ///< of each unknown: its component, and its number there
+  DisjointSets sets_;
+  std::vector<int> component_of_, number_;   ///< of each unknown: its component, and its number there
 };
 
 }   // namespace slender

@@ -96,7 +96,7 @@ void RodPart::followJoints()
 
 void RodPart::gather(Eigen::Matrix3Xd& x) const
 {
-  for (int i = 0; i < points(); ++i)
+  for (int i = 0, n = points(); i < n; ++i)
     x.col(first_point + i) = system_.position(i);
 }
 

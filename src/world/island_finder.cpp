@@ -6,25 +6,6 @@
 
 namespace slender {
 
-void IslandFinder::begin(int parts)
-{
-  parent_.resize(static_cast<std::size_t>(parts));
-  std::iota(parent_.begin(), parent_.end(), 0);
-}
-
-int IslandFinder::root(int part)
-{
-  while (parent_[part] != part)
-    part = parent_[part] = parent_[parent_[part]];
-  return part;
-}
-
-void IslandFinder::join(int a, int b)
-{
-  a = root(a), b = root(b);
-  parent_[std::max(a, b)] = std::min(a, b);
-}
-
 /// Sorts the boxes along x, and compares each with those that begin before it ends.
 bool IslandFinder::joinNear(const std::vector<Reach>& parts, double margin)
 {
@@ -51,7 +32,7 @@ bool IslandFinder::joinNear(const std::vector<Reach>& parts, double margin)
     for (std::size_t k = i + 1; k < order_.size() && boxes_[order_[k]].low.x() <= boxes_[order_[i]].high.x(); ++k)
     {
       const int a = order_[i], b = order_[k];
-      if (boxes_[a].overlaps(boxes_[b]) && parts[a].mayTouch(parts[b]) && root(a) != root(b))
+      if (boxes_[a].overlaps(boxes_[b]) && parts[a].mayTouch(parts[b]) && sets_.of(a) != sets_.of(b))
       {
         join(a, b);
         joined = true;
@@ -62,16 +43,16 @@ bool IslandFinder::joinNear(const std::vector<Reach>& parts, double margin)
 
 int IslandFinder::find()
 {
-  const int parts = static_cast<int>(parent_.size());
+  const int parts = sets_.count();
   int islands = 0;
-  island_of_.resize(parent_.size());
-  for (int k = 0; k < parts; ++k)   // the root of an island is its first part
-    island_of_[k] = root(k) == k ? islands++ : island_of_[root(k)];
+  island_of_.resize(static_cast<std::size_t>(parts));
+  for (int k = 0; k < parts; ++k)   // the name of a set is its first part
+    island_of_[k] = sets_.of(k) == k ? islands++ : island_of_[sets_.of(k)];
   start_.assign(static_cast<std::size_t>(islands) + 1, 0);
   for (int k = 0; k < parts; ++k)
     ++start_[island_of_[k] + 1];
   std::partial_sum(start_.begin(), start_.end(), start_.begin());
-  parts_.resize(parent_.size());
+  parts_.resize(static_cast<std::size_t>(parts));
   order_.assign(start_.begin(), start_.end() - 1);
   for (int k = 0; k < parts; ++k)
     parts_[order_[island_of_[k]]++] = k;

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "linalg/disjoint_sets.h"
 #include "slender_sim/contact/broad_phase.h"
 
 namespace slender {
@@ -27,8 +28,8 @@ public:
   };
 
   /// Begins with this many parts, each of which is an island.
-  void begin(int parts);
-  void join(int a, int b);
+  void begin(int parts) { sets_.begin(parts); }
+  void join(int a, int b) { sets_.unite(a, b); }
   /// Joins parts that may touch and whose boxes, enlarged by `margin` [m], overlap. A box that is not finite overlaps
   /// all others. Returns whether parts of different islands were joined.
   bool joinNear(const std::vector<Reach>& parts, double margin);
@@ -39,9 +40,8 @@ public:
   void partsOf(int island, std::vector<int>& parts) const;
 
 private:
-  int root(int part);
-
-  std::vector<int> parent_, order_, island_of_, start_, parts_;
+  DisjointSets sets_;
+  std::vector<int> order_, island_of_, start_, parts_;
   std::vector<BoundingBox> boxes_;
 };
 

@@ -52,6 +52,9 @@ struct Matrix
   std::vector<double> values;
 };
 
+/// No unknown is idle.
+std::vector<char> busy(Eigen::Index unknowns) { return std::vector<char>(static_cast<std::size_t>(unknowns), 0); }
+
 /// Solves with `kept`, which may know parts of the pattern, and with a fresh factorisation. The results are equal to
 /// the last bit, and solve the equations up to round-off.
 void solveWith(ComponentCholesky& kept, const Matrix& a, bool simplicial)
@@ -64,8 +67,8 @@ void solveWith(ComponentCholesky& kept, const Matrix& a, bool simplicial)
   for (const int threads : {1, 3})
   {
     Eigen::VectorXd x = b, y = b;
-    ASSERT_TRUE(kept.factor(a.values, threads));
-    ASSERT_TRUE(fresh.factor(a.values, 1));
+    ASSERT_TRUE(kept.factor(a.values, busy(n), threads));
+    ASSERT_TRUE(fresh.factor(a.values, busy(n), 1));
     kept.solve(x.data(), threads);
     fresh.solve(y.data(), 1);
     EXPECT_EQ(x, y);
@@ -112,11 +115,36 @@ TEST(ComponentCholesky, OneIndefiniteComponentIsEnough)
     ComponentCholesky cholesky(simplicial);
     solveWith(cholesky, a, simplicial);
     a.values[a.starts[13]] *= -1.0;   // a diagonal entry
-    EXPECT_FALSE(cholesky.factor(a.values, 1));
-    EXPECT_FALSE(cholesky.factor(a.values, 2));
+    EXPECT_FALSE(cholesky.factor(a.values, busy(80), 1));
+    EXPECT_FALSE(cholesky.factor(a.values, busy(80), 2));
     a.list();
     solveWith(cholesky, a, simplicial);
   }
+}
+
+/// Idle components are neither factored nor solved for, and come back when they are wanted.
+TEST(ComponentCholesky, LeavesIdleComponentsOut)
+{
+  Random random(3);
+  Matrix a(80);
+  for (int k = 0; k < 4; ++k)
+    a.addBand(random, k, 4, 20, 2);
+  a.list();
+  ComponentCholesky cholesky(false);
+  solveWith(cholesky, a, false);
+  std::vector<double> values = a.values;
+  values[a.starts[13]] *= -1.0;   // a diagonal entry of the second component
+  std::vector<char> idle = busy(80);
+  for (int u = 1; u < 80; u += 4)
+    idle[u] = 1;
+  ASSERT_TRUE(cholesky.factor(values, idle, 2));
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(80, 1.0, 2.0);
+  Eigen::VectorXd some = b, all = b;
+  cholesky.solve(some.data(), 2);
+  ASSERT_TRUE(cholesky.factor(a.values, busy(80), 1));
+  cholesky.solve(all.data(), 1);
+  for (int u = 0; u < 80; ++u)
+    EXPECT_EQ(some[u], idle[u] ? b[u] : all[u]) << u;
 }
 
 }   // namespace

@@ -7,12 +7,12 @@
 namespace slender::test {
 namespace {
 
-std::vector<GridPairs::Pair> allPairs(const std::vector<BoundingBox>& boxes)
+std::vector<GridPairs::Pair> allPairs(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets)
 {
   std::vector<GridPairs::Pair> pairs;
   for (int i = 0; i < static_cast<int>(boxes.size()); ++i)
     for (int j = i + 1; j < static_cast<int>(boxes.size()); ++j)
-      if (boxes[i].overlaps(boxes[j]))
+      if (boxes[i].overlaps(boxes[j]) && (sets[i] != sets[j] || sets[i] == GridPairs::kNone))
         pairs.push_back({i, j});
   return pairs;
 }
@@ -38,10 +38,13 @@ TEST(BroadPhase, FindsThePairsOfBruteForceInOrder)
     }
     if (k == 40)
       std::fill(boxes.begin(), boxes.end(), boxes[0]);
-    const auto expected = allPairs(boxes);
+    std::vector<int> sets(boxes.size(), GridPairs::kNone);
+    for (std::size_t i = 0; i < sets.size() && k % 2 == 1; ++i)
+      sets[i] = static_cast<int>(i) / 10 - 1;   // The first ten belong to none.
+    const auto expected = allPairs(boxes, sets);
     for (const int threads : {1, 2})
     {
-      const auto& found = grid.find(boxes, threads);
+      const auto& found = grid.find(boxes, sets, threads);
       ASSERT_EQ(found.size(), expected.size()) << k;
       for (std::size_t i = 0; i < found.size(); ++i)
         ASSERT_TRUE(found[i].first == expected[i].first && found[i].second == expected[i].second) << k;

@@ -232,6 +232,33 @@ TEST(OwnPart, SettlesWhileOthersTouch)
   EXPECT_LT(alone.evaluations, lower.evaluations / 2);
 }
 
+/// Two balls that rest against each other, pressed together by their springs, settle although they touch. Two others
+/// collide meanwhile. The motion of the first two hardly depends on that: by as much as a solution is resolved.
+TEST(OwnPart, AGroupSettlesWhileAnotherOneGoesOn)
+{
+  const auto run = [](double speed, int& quiet, int& busy) {
+    CountingBall a({0, 0, 0}), b({0, 0, 0.0405}), upper({1, 0, 0.041}), lower({1, 0, 0});
+    a.anchor.z() = 0.01;   // presses
+    upper.v = {0, 0, -speed};
+    for (CountingBall* ball : {&a, &b, &upper, &lower})
+      ball->gravity.setZero();
+    ClothIsland island(kIslandStep, kIslandGap);
+    island.others = {&a, &b, &upper, &lower};
+    for (int k = 0; k < 5; ++k)
+      step(island);
+    quiet = a.evaluations;
+    busy = lower.evaluations;
+    return Eigen::Vector2d(a.x.z(), b.x.z());
+  };
+  int alone = 0, beside = 0, few = 0, many = 0;
+  const Eigen::Vector2d expected = run(0.0, alone, few), found = run(3.0, beside, many);
+  EXPECT_GT(expected[1] - expected[0], 0.04);   // They touch, and do not overlap.
+  EXPECT_LT(expected[1] - expected[0], 0.04 + kIslandGap);
+  EXPECT_GT(many, few + 20);
+  EXPECT_LT(beside, many - 20);
+  EXPECT_LT((expected - found).cwiseAbs().maxCoeff(), 5e-3 * kIslandGap);   // A solution is resolved to 1e-3 of it.
+}
+
 /// Twists a straight rod at one end, beside two balls of which one flies at the other with this speed [m/s]. Returns
 /// the twist.
 Eigen::VectorXd twistBeside(double speed, int& evaluations)

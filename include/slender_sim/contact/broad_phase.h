@@ -39,17 +39,19 @@ public:
   {
     int first, second;   ///< first < second
   };
-  /// Returns all overlapping pairs, sorted. Boxes must be finite. `threads` search; with 0 OpenMP chooses their number.
-  const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes, int threads = 1);
+  static constexpr int kNone = -1;
+  /// Returns all overlapping pairs, sorted. Boxes must be finite. Two boxes of the same set are no pair; `sets` has the
+  /// set of each box, or kNone. `threads` search; with 0, as many as there are processors.
+  const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, int threads = 1);
 
 private:
   struct Entry
   {
     std::int32_t cell[3];
-    int box;
+    int box, set;
   };
   double cellSize(const std::vector<BoundingBox>& boxes) const;
-  void fillBuckets(const std::vector<BoundingBox>& boxes, double inverse_size);
+  void fillBuckets(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, double inverse_size);
   void search(const std::vector<BoundingBox>& boxes, double inverse_size, unsigned bucket,
               std::vector<Pair>& found) const;
   void sortPairs(int boxes);
