@@ -17,7 +17,7 @@ constexpr long kFlops = 600;   // of dense matrices, to a count of a WorkBudget
 /// times |target - average| for each instead of the condition that both are the same. An average is either met, or its
 /// force is at the bound and points from it to its target. Where no bound is reached that is solve().
 LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages,
-                                                std::vector<int>& at_bound, int& linear_iterations)
+                                                std::vector<int>& at_bound, long& linear_iterations)
 {
   AverageBounds& b = *bounds_;
   const Eigen::VectorXd& most = used_->prescribed->bounds;
@@ -69,7 +69,7 @@ LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Mat
 /// [O'Donoghue & Candes, Found. Comput. Math. 15 (2015), 715]). Forces keep their bounds whatever is left to converge.
 /// Gives up early where cloth is stiff: there Gauss-Seidel sweeps over the averages take thousands, and steps hundreds.
 LinearOutcome AveragedClothSolver::stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages,
-                                                      double& reference, int& linear_iterations)
+                                                      double& reference, long& linear_iterations)
 {
   constexpr int kMostIterations = 25;
   constexpr double kSteepest = 1e6;   // of the preconditioner
@@ -224,7 +224,7 @@ double AveragedClothSolver::moveBounded(PointVector& d, const Eigen::Matrix3Xd& 
 /// take a few steps of semismooth Newton with a line search [Li, Sun & Toh, SIAM J. Optim. 28 (2018), 433], and these
 /// conjugate gradients.
 LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,
-                                                   int& linear_iterations)
+                                                   long& linear_iterations)
 {
   // rounds of multipliers, Newton steps in each, and all of conjugate gradients
   constexpr int kMostRounds = 60, kMostSteps = 60, kMostIterations = 4000;

@@ -76,19 +76,19 @@ void AveragedClothSolver::beginStage()
   used_->ready = true;
 }
 
-LinearOutcome AveragedClothSolver::solve(PointVector& d, const PointVector*, int& linear_iterations, int&,
+LinearOutcome AveragedClothSolver::solve(PointVector& d, const PointVector*, long& linear_iterations, long&,
                                          double tolerance)
 {
   return solveMeeting(nullptr, d, linear_iterations, tolerance);
 }
 
-LinearOutcome AveragedClothSolver::solveTo(const Eigen::Matrix3Xd& averages, PointVector& d, int& linear_iterations)
+LinearOutcome AveragedClothSolver::solveTo(const Eigen::Matrix3Xd& averages, PointVector& d, long& linear_iterations)
 {
   return solveMeeting(&averages, d, linear_iterations, 0.0);
 }
 
 LinearOutcome AveragedClothSolver::solveMeeting(const Eigen::Matrix3Xd* averages, PointVector& d,
-                                                int& linear_iterations, double tolerance)
+                                                long& linear_iterations, double tolerance)
 {
   if (!independent() || !preconditioned_)
     return LinearOutcome::not_definite;
@@ -263,7 +263,7 @@ bool AveragedClothSolver::bendsLittle() const
 /// stiffness; rounds go on until that motion is so small that positions are as good as those of the same cloth without
 /// averages.
 LinearOutcome AveragedClothSolver::sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance,
-                                                     int& linear_iterations)
+                                                     long& linear_iterations)
 {
   constexpr int kMostRounds = 4;
   // measured (study tracking_overhead): of the preconditioner; of the tolerance, in its norm

@@ -26,14 +26,14 @@ public:
   void beginStage() override;
   /// Averages stay what the first guess makes them; `at` is not used, because averages are met with the constant
   /// matrix.
-  LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
+  LinearOutcome solve(PointVector& d, const PointVector* at, long& linear_iterations, long& factorizations,
                       double tolerance = 0.0) override;
   /// The same, but the points x + d, x the start of the stage, get these averages (3 x count).
-  LinearOutcome solveTo(const Eigen::Matrix3Xd& averages, PointVector& d, int& linear_iterations);
+  LinearOutcome solveTo(const Eigen::Matrix3Xd& averages, PointVector& d, long& linear_iterations);
   /// The same for a linearised step of a model with bounds of its averages' forces. `at_bound`: which were, and are, at
   /// their bounds.
   LinearOutcome solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound,
-                             int& linear_iterations);
+                             long& linear_iterations);
 
   /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x
   /// count).
@@ -64,7 +64,7 @@ private:
 
   void use(AverageSet& set);
   /// `averages` null: these stay.
-  LinearOutcome solveMeeting(const Eigen::Matrix3Xd* averages, PointVector& d, int& linear_iterations,
+  LinearOutcome solveMeeting(const Eigen::Matrix3Xd* averages, PointVector& d, long& linear_iterations,
                              double tolerance);
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
@@ -75,11 +75,11 @@ private:
   bool sweepsSuit(const PrescribedAverages& averages) const;
   bool bendsLittle() const;
   LinearOutcome sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance,
-                                  int& linear_iterations);
+                                  long& linear_iterations);
   LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference,
-                                   int& linear_iterations);
+                                   long& linear_iterations);
   LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,
-                                int& linear_iterations);
+                                long& linear_iterations);
   double boundedForces();
   void setBoundedGap(const PointVector& d, const Eigen::Matrix3Xd& averages);
   LinearResult solveBoundedStep(double tolerance, int most);

@@ -73,8 +73,8 @@ void ClothLinearSolver::setRight(const PointVector& d)
   clearHeld(right_);
 }
 
-LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, int& linear_iterations,
-                                       int& factorizations, double tolerance)
+LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, long& linear_iterations,
+                                       long& factorizations, double tolerance)
 {
   const std::vector<char>& held = system_.held();
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
@@ -111,7 +111,7 @@ LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, in
 }
 
 LinearOutcome ClothLinearSolver::correct(PointVector& d, const LinearResult& result, double tolerance, double load,
-                                         int& linear_iterations)
+                                         long& linear_iterations)
 {
   linear_iterations += result.iterations;
   spend(result.iterations + 1);

@@ -46,7 +46,7 @@ public:
   /// `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
   /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant
   /// matrix. `tolerance`: theirs, 0: that of the options. The numbers grow by what was needed.
-  virtual LinearOutcome solve(PointVector& d, const PointVector* at, int& linear_iterations, int& factorizations,
+  virtual LinearOutcome solve(PointVector& d, const PointVector* at, long& linear_iterations, long& factorizations,
                               double tolerance = 0.0);
 
 protected:
@@ -72,7 +72,7 @@ protected:
   /// Adds correction_, the solution of conjugate gradients, to d. `load`: what is strained so much that little is left
   /// beside this load is solved to a share of it.
   LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, double load,
-                        int& linear_iterations);
+                        long& linear_iterations);
   /// Of conjugate gradients: `most`, or what the budget has room for.
   int iterationsWithin(int most) const
   {

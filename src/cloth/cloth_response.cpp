@@ -19,7 +19,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
     average_forces_change.setZero(3, average_forces.cols());
     return true;
   }
-  int iterations = 0, factorizations = 0;
+  long iterations = 0, factorizations = 0;
   // what it leaves unbalanced the grasps' wrenches lack: below a thousandth of the load
   constexpr double kTolerance = 5e-4;
   const auto solve = [&] {

@@ -106,8 +106,8 @@ public:
     return std::isfinite(at.energy()) && at.min_chi > kFoldedChi && at.inertia.zero == 0;
   }
 
-  bool correct(double& at, const Eigen::VectorXd* along, double along_factor, int& iterations);
-  bool tryStep(double share, int& iterations);
+  bool correct(double& at, const Eigen::VectorXd* along, double along_factor, long& iterations);
+  bool tryStep(double share, long& iterations);
 
   std::shared_ptr<const RodModel> model;
   RodState state;
@@ -121,7 +121,7 @@ public:
 };
 
 /// Newton's method from the trial on, in the plane across the tangent `along`; null: at a fixed factor.
-bool RodPath::Impl::correct(double& at, const Eigen::VectorXd* along, double along_factor, int& iterations)
+bool RodPath::Impl::correct(double& at, const Eigen::VectorXd* along, double along_factor, long& iterations)
 {
   constexpr int kMost = 25;
   // of the length and of the last factor; differences of positions round to 1e-16 of the length
@@ -160,7 +160,7 @@ bool RodPath::Impl::correct(double& at, const Eigen::VectorXd* along, double alo
   return false;
 }
 
-bool RodPath::Impl::tryStep(double share, int& iterations)
+bool RodPath::Impl::tryStep(double share, long& iterations)
 {
   constexpr double kFurthest = 1.5;   // times the step: what is further away may be another branch, or leave out a fold
   iterations = 0;
@@ -206,7 +206,7 @@ StepReport RodPath::advance(double share)
   double now = m.share_now > 0 ? std::min(share, m.share_now) : share;
   for (int attempt = 0; attempt < 24; ++attempt, now *= 0.5)
   {
-    int iterations = 0;
+    long iterations = 0;
     m.reload();
     const bool good = m.tryStep(now, iterations);
     report.iterations += iterations;

@@ -187,7 +187,7 @@ StepFailure ImpulseCloths::attempt(const Substep& substep, StepReport& report)
   report.ok = true;   // a failure is told by refuse() when no shorter substep succeeds
   report.message.clear();
   // The controller counts the substep. What remains is how often cloths divided it further.
-  report.substeps = std::max(0, report.substeps - static_cast<int>(steppers_.size()));
+  report.substeps = std::max(0L, report.substeps - static_cast<long>(steppers_.size()));
   return std::exchange(report.failure, StepFailure::none);
 }
 

@@ -29,25 +29,25 @@ enum class StepFailure
   interrupted,      ///< the process was asked to end (interruptSteps()); nothing is wrong with the step
 };
 
-/// What one call of step() did. Sums and maxima run over all its substeps.
+/// What one call of step() did. Sums and maxima run over all its substeps. RunStatistics sums many reports.
 struct StepReport
 {
   bool ok = true;
   StepFailure failure = StepFailure::none;
-  std::string message;         ///< empty when ok; otherwise the reason and what to change
-  FailurePlace place;          ///< of a failure: the node that it is about, where that is known
-  int substeps = 0;            ///< steps actually taken (1 unless the step was cut or adapted)
-  int cut_steps = 0;           ///< how often a step was halved because it could not be done
-  int iterations = 0;          ///< Newton iterations
-  int linear_iterations = 0;   ///< of conjugate gradients (cloth; islands of several parts)
-  int factorizations = 0;      ///< banded factorisations (more than iterations when a Hessian was shifted)
-  double residual = 0.0;       ///< largest unbalanced nodal force over the largest force on any node [-]
-  double max_strain = 0.0;     ///< largest |stretch strain| over all edges [-]
-  long repulsions = 0;         ///< cloth: pairs of pieces nearer than the thickness, or about to be
-  long impulses = 0;           ///< cloth: collisions found and stopped
-  long zones = 0;              ///< cloth: pieces that could only be kept apart by moving them rigidly
+  std::string message;          ///< empty when ok; otherwise the reason and what to change
+  FailurePlace place;           ///< of a failure: the node that it is about, where that is known
+  long substeps = 0;            ///< steps actually taken (1 unless the step was cut or adapted)
+  long cut_steps = 0;           ///< how often a step was halved because it could not be done
+  long iterations = 0;          ///< Newton iterations
+  long linear_iterations = 0;   ///< of conjugate gradients (cloth; islands of several parts)
+  long factorizations = 0;      ///< banded factorisations (more than iterations when a Hessian was shifted)
+  double residual = 0.0;        ///< largest unbalanced nodal force over the largest force on any node [-]
+  double max_strain = 0.0;      ///< largest |stretch strain| over all edges [-]
+  long repulsions = 0;          ///< cloth: pairs of pieces nearer than the thickness, or about to be
+  long impulses = 0;            ///< cloth: collisions found and stopped
+  long zones = 0;               ///< cloth: pieces that could only be kept apart by moving them rigidly
   /// threads: sharp folds that were taken out because the step could not be done with them
-  int mended_folds = 0;
+  long mended_folds = 0;
   bool stable = true;   ///< statics: no small motion lowers the energy (false: stationary only, a saddle)
   /// statics: elastic energy and that of gravity and forces [J]; torques about tangents have none
   double energy = 0.0;

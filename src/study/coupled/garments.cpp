@@ -262,7 +262,7 @@ struct GarmentResult
 {
   int steps = 0;
   bool finished = false;
-  int iterations = 0, most_iterations = 0, cut_steps = 0, penetrations = 0;
+  long iterations = 0, most_iterations = 0, cut_steps = 0, penetrations = 0;
   double cpu_seconds = 0.0;
   double room = kFar, held_room = kFar;   ///< [m]
   std::string refusal;                    ///< empty: none

@@ -167,7 +167,7 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
     return std::sqrt(pointKernels().dot(n, away.data(), product.data()));
   };
   PointVector moved = guess;
-  int iterations = 0, factorizations = 0;
+  long iterations = 0, factorizations = 0;
   solver.solve(moved, nullptr, iterations, factorizations);
   for (std::size_t i = 0; i < moved.size(); ++i)
     moved[i] -= guess[i];

@@ -88,7 +88,7 @@ Parts partsOf(const ClothSetup& cloth, const ClothOptions& options, double budge
   solver.beginStage();
   Parts parts;
   parts.assembly = leastSeconds(budget, [&] { system.evaluateHessian(x, HessianKind::semidefinite); });
-  int iterations = 0, factorizations = 0;
+  long iterations = 0, factorizations = 0;
   parts.solve = leastSeconds(budget, [&] {
     toPoints(kStep * cloth.state.v, d);
     for (const int p : cloth.state.pins)
