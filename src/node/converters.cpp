@@ -200,14 +200,6 @@ void toTracking(const RodConfig& rod, const GuideState& guide, const RodState& s
     out.guide_nodes.push_back(toPoint(guide.points.col(k)));
 }
 
-void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out)
-{
-  forEachFrame(model, state, [&](int j, const Eigen::Matrix3d& axes) {
-    const Eigen::Vector3d middle = 0.5 * (state.x.col(j) + state.x.col((j + 1) % model.nodes()));
-    out.push_back(toMessage(Pose{middle, Eigen::Quaterniond(axes).normalized()}));
-  });
-}
-
 void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
 {
   const std::size_t nodes = state.x.size(), edges = state.volume.size();
@@ -233,12 +225,6 @@ void toMessage(const ThreadState& state, slender_sim::ThreadState& out)
   }
   out.fed_volume = state.fed_volume;
   out.dropped_volume = state.dropped_volume + state.left_volume;
-}
-
-void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out)
-{
-  for (int j = 0; j < state.edges(); ++j)
-    out.push_back(toMessage(Pose{0.5 * (state.x[j] + state.x[j + 1]), edgeFrame(state, j)}));
 }
 
 void append(const std::string& name, const ClothState& state, slender_sim::ClothState& out)

@@ -8,12 +8,11 @@
 namespace slender {
 namespace {
 
-void clear(slender_sim::BodyStates& states, const std_msgs::Header& header)
+/// Empties lists, whose memory is used again.
+template <class... Lists>
+void clear(Lists&... lists)
 {
-  states.header = header;
-  states.name.clear();
-  states.pose.clear();
-  states.twist.clear();
+  (lists.clear(), ...);
 }
 
 void append(const std::string& name, const Pose& X, const Twist& velocity, slender_sim::BodyStates& out)
@@ -55,15 +54,14 @@ void SceneMessages::fillRods(const Simulation& simulation)
   states.resize(scene.rods.size());
   for (std::size_t r = 0; r < scene.rods.size(); ++r)
   {
-    const RodModel& model = simulation.rodModel(static_cast<int>(r));
     slender_sim::RodState& message = states[r].renew();
-    toMessage(model, scene.rods[r], message);
+    toMessage(simulation.rodModel(static_cast<int>(r)), scene.rods[r], message);
     if (const RodConfig& rod = simulation.config().rods[r]; rod.tracking)
       toTracking(rod, scene.rod_guides[r], scene.rods[r], message);
     message.header = header;
     message.epoch = epoch_;
     message.step = scene.steps;
-    appendPoses(model, scene.rods[r], poses.poses);
+    appendPoses(message, poses.poses);
   }
 }
 
@@ -86,7 +84,7 @@ void SceneMessages::fillThreads(const Simulation& simulation)
       message.epoch = epoch_;
       message.step = scene.steps;
       message.name = simulation.threadModel(static_cast<int>(k)).name;
-      appendPoses(thread, poses.poses);
+      appendPoses(message, poses.poses);
     }
     nozzles[k].header = header;
     nozzles[k].wrench = toMessage(scene.end_loads[k][1]);
@@ -101,19 +99,9 @@ void SceneMessages::fillCloths(const Simulation& simulation)
   cloths.header = header;
   cloths.epoch = epoch_;
   cloths.step = scene.steps;
-  cloths.names.clear();
-  cloths.offsets.clear();
-  cloths.vertices.clear();
-  cloths.velocities.clear();
-  cloths.constraint_errors.clear();
-  cloths.guide_offsets.clear();
-  cloths.guide_vertices.clear();
-  cloths.function_offsets.clear();
-  cloths.guide_forces.clear();
-  cloths.forces_at_bound.clear();
-  cloths.bound_distances.clear();
-  cloths.function_sets.clear();
-  cloths.blend_distances.clear();
+  clear(cloths.names, cloths.offsets, cloths.vertices, cloths.velocities, cloths.constraint_errors,
+        cloths.guide_offsets, cloths.guide_vertices, cloths.function_offsets, cloths.guide_forces,
+        cloths.forces_at_bound, cloths.bound_distances, cloths.function_sets, cloths.blend_distances);
   static const GuideState no_guide;
   for (std::size_t k = 0; k < scene.cloths.size(); ++k)
   {
@@ -154,10 +142,10 @@ void SceneMessages::fillSolids(const Simulation& simulation)
 {
   const SceneState& scene = simulation.state();
   const std::vector<BodyConfig>& configs = simulation.config().bodies;
-  clear(bodies, header);
+  bodies.header = obstacles.header = header;
+  clear(bodies.name, bodies.pose, bodies.twist, obstacles.name, obstacles.pose, obstacles.twist);
   for (std::size_t b = 0; b < configs.size(); ++b)
     append(configs[b].name, scene.bodies[b].X_WB, scene.bodies[b].velocity, bodies);
-  clear(obstacles, header);
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
     append(simulation.config().obstacles[k].name, scene.obstacles[k], scene.obstacle_velocities[k], obstacles);
 }

@@ -317,7 +317,7 @@ void SceneNode::publishObjects()
       geometry_msgs::PoseArray& poses = rod_poses_[r].renew();
       poses.header = messages_.header;
       poses.poses.clear();
-      appendPoses(simulation_->rodModel(static_cast<int>(r)), simulation_->state().rods[r], poses.poses);
+      appendPoses(*messages_.states[r], poses.poses);
       pubs_.each_rod_poses[r].publish(rod_poses_[r].pointer());
     }
   for (const auto& state : messages_.states)

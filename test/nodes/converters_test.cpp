@@ -136,7 +136,7 @@ TEST(Converters, RodStateMessage)
     EXPECT_LT((frame * Eigen::Vector3d::UnitY() - state.d1.col(j)).norm(), 1e-14);
   }
   std::vector<geometry_msgs::Pose> poses;
-  appendPoses(model, state, poses);
+  appendPoses(message, poses);
   ASSERT_EQ(poses.size(), 2u);
   EXPECT_EQ(poses[1].position.z, 1.0);
   model.radius_b *= 2.0;

@@ -91,9 +91,17 @@ std::string fromPoints(const sensor_msgs::PointCloud2& message, Eigen::Matrix3Xd
 /// Vertices of all cloths as x, y, z in float32. Fills everything but the header.
 void toPoints(const slender_sim::ClothState& state, sensor_msgs::PointCloud2& out);
 
-/// Appends the middle of each edge with the edge's frame.
-void appendPoses(const RodModel& model, const RodState& state, std::vector<geometry_msgs::Pose>& out);
-
-void appendPoses(const ThreadState& state, std::vector<geometry_msgs::Pose>& out);
+/// Appends the middle of each edge of a rod or a thread with the edge's frame.
+template <class State>
+void appendPoses(const State& state, std::vector<geometry_msgs::Pose>& out)
+{
+  for (std::size_t j = 0; j < state.frames.size(); ++j)
+  {
+    const geometry_msgs::Point &a = state.nodes[j], &b = state.nodes[(j + 1) % state.nodes.size()];
+    out.emplace_back();
+    out.back().position = toPoint(0.5 * (fromMessage(a) + fromMessage(b)));
+    out.back().orientation = state.frames[j];
+  }
+}
 
 }   // namespace slender
