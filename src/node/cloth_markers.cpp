@@ -98,7 +98,8 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
       const auto& tracking = simulation.config().cloths[k].tracking;
       const bool regions = style == MarkerStyle::regions && tracking;
       Eigen::Matrix3Xd paints =
-          regions ? functionColors(simulation.functions(static_cast<int>(k)).functions.tracked) : Eigen::Matrix3Xd();
+          regions ? functionColors(simulation.functions({ObjectRef::cloth, static_cast<int>(k)}).functions.tracked)
+                  : Eigen::Matrix3Xd();
       const std::vector<double> values = shownValues(model, x, options.color);
       if (!values.empty())
         paints.resize(3, x.cols());
@@ -121,15 +122,15 @@ void addClothMarkers(const Simulation& simulation, const std_msgs::Header& heade
   }
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
-    const GraspRef& ref = simulation.grasps()[g];
-    if (ref.cloth < 0)
+    const auto& [object, index, config] = simulation.grasps()[g];
+    if (!object.isCloth())
       continue;
     Marker marker = makeMarker(header, "grasps", static_cast<int>(g), Marker::SPHERE_LIST);
-    const Eigen::Matrix3Xd& x = simulation.state().cloths[ref.cloth].x;
-    const ClothGrasp& grasp = simulation.state().cloth_grasps[ref.cloth][ref.index];
-    marker.scale.x = marker.scale.y = marker.scale.z = 0.4 * spacing[ref.cloth];
+    const Eigen::Matrix3Xd& x = simulation.state().cloths[object.index].x;
+    const ClothGrasp& grasp = simulation.state().cloth_grasps[object.index][index];
+    marker.scale.x = marker.scale.y = marker.scale.z = 0.4 * spacing[object.index];
     marker.color =
-        std::holds_alternative<FixedMotion>(ref.config->motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
+        std::holds_alternative<FixedMotion>(config->motion) ? color(0.35, 0.37, 0.40) : color(0.22, 0.27, 0.33);
     for (const int vertex : grasp.vertices)
       marker.points.push_back(toPoint(x.col(vertex)));
     if (!grasp.active)

@@ -65,7 +65,7 @@ void addForceMarkers(const Simulation& simulation, const std_msgs::Header& heade
     add(contact.position, contact.force);
   for (std::size_t k = 0; k < simulation.state().cloths.size(); ++k)
   {
-    const Eigen::Matrix3Xd forces = simulation.world().clothContactForces(static_cast<int>(k));
+    const Eigen::Matrix3Xd forces = simulation.world().contactForces({ObjectRef::cloth, static_cast<int>(k)});
     for (Eigen::Index i = 0; i < forces.cols(); ++i)
       add(simulation.state().cloths[k].x.col(i), forces.col(i));
   }

@@ -16,20 +16,20 @@ double diagonal(const Eigen::AlignedBox3d& box) { return box.isEmpty() ? 1.0 : s
 /// with a mouse where all of the object is in view.
 void sizeGraspHandle(const Simulation& simulation, const GraspRef& ref, Handle& handle)
 {
-  if (ref.cloth >= 0)
+  if (ref.object.isCloth())
   {
-    const Eigen::Matrix3Xd& x = simulation.state().cloths[ref.cloth].x;
+    const Eigen::Matrix3Xd& x = simulation.state().points(ref.object);
     const double size = diagonal(Eigen::AlignedBox3d(x.rowwise().minCoeff(), x.rowwise().maxCoeff()));
     handle.size = 0.12 * size;
     handle.ball = 0.03 * size;
     return;
   }
-  const RodModel& model = simulation.rodModel(ref.rod);
+  const RodModel& model = simulation.rodModel(ref.object.index);
   const double radius = std::max(model.radius_a.maxCoeff(), model.radius_b.maxCoeff()),
                length = model.rest_length.sum();
   handle.size = std::max(12.0 * radius, 0.08 * length);
   handle.ball = std::max(5.0 * radius, 0.02 * length);
-  handle.turns = simulation.state().rods[ref.rod].grasps[ref.index].holds_frame;
+  handle.turns = simulation.state().rods[ref.object.index].grasps[ref.index].holds_frame;
 }
 
 /// How far a shape reaches from its origin [m]. Of a plane only a piece is drawn.

@@ -233,12 +233,11 @@ visualization_msgs::MarkerArray sceneMarkers(const Simulation& simulation, const
   }
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
-    const GraspRef& ref = simulation.grasps()[g];
-    if (ref.cloth >= 0)
-      continue;
-    out.markers.push_back(graspMarker(header, static_cast<int>(g), *ref.config,
-                                      simulation.state().rods[ref.rod].grasps[ref.index],
-                                      simulation.rodModel(ref.rod)));
+    const auto& [object, index, config] = simulation.grasps()[g];
+    if (!object.isCloth())
+      out.markers.push_back(graspMarker(header, static_cast<int>(g), *config,
+                                        simulation.state().rods[object.index].grasps[index],
+                                        simulation.rodModel(object.index)));
   }
   addThreadMarkers(simulation, header, options, range, out);
   addClothMarkers(simulation, header, options, range, out);

@@ -106,13 +106,14 @@ void SceneMessages::fillCloths(const Simulation& simulation)
   for (std::size_t k = 0; k < scene.cloths.size(); ++k)
   {
     append(simulation.config().cloths[k].name, scene.cloths[k], cloths);
-    const TrackingError error = simulation.trackingError(static_cast<int>(k));
-    const GuideState& guide = scene.cloth_guides.empty() ? no_guide : scene.cloth_guides[k];
+    const ObjectRef cloth{ObjectRef::cloth, static_cast<int>(k)};
+    const TrackingError error = simulation.trackingError(cloth);
+    const GuideState& guide = scene.cloth_guides.empty() ? no_guide : scene.guide(cloth);
     appendTracking(error.met, guide.points, guide.forces, cloths);
     cloths.forces_at_bound.push_back(static_cast<std::uint32_t>(scene.cloths[k].at_bound.size()));
     cloths.bound_distances.push_back(error.at_bound);
-    cloths.function_sets.push_back(
-        simulation.config().cloths[k].tracking ? simulation.functions(static_cast<int>(k)).name : std::string());
+    cloths.function_sets.push_back(simulation.config().cloths[k].tracking ? simulation.functions(cloth).name
+                                                                          : std::string());
     cloths.blend_distances.push_back(error.blend);
   }
 }

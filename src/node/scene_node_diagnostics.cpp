@@ -70,17 +70,16 @@ void addThreads(const Simulation& simulation, const RunStatistics& recent, Diagn
 }
 
 /// Of tracked cloths with several sets.
-void addFunctions(const Simulation& simulation, int cloth, DiagnosticStatus& status)
+void addFunctions(const Simulation& simulation, const GuideRef& guide, DiagnosticStatus& status)
 {
-  const ClothConfig& config = simulation.config().cloths[cloth];
-  if (!config.tracking || config.tracking->sets.size() < 2)
+  if (guide.tracking->sets.size() < 2)
     return;
-  const GuideState& held = simulation.state().cloth_guides[cloth];
+  const FunctionBlend& blend = simulation.state().guide(guide.object).blend;
   const double time = simulation.state().time;
-  add(status, "test functions of " + config.name, simulation.functions(cloth).name);
-  add(status, "blend of " + config.name + " goes on for [s]",
-      held.blend.active(time) ? held.blend.start + held.blend.duration - time : 0.0);
-  add(status, "blend of " + config.name + " leaves at most [m]", held.blend.left(time));
+  add(status, "test functions of " + guide.name, simulation.functions(guide.object).name);
+  add(status, "blend of " + guide.name + " goes on for [s]",
+      blend.active(time) ? blend.start + blend.duration - time : 0.0);
+  add(status, "blend of " + guide.name + " leaves at most [m]", blend.left(time));
 }
 
 /// How a run that begins in equilibrium began.
@@ -102,29 +101,21 @@ void addStart(const Simulation& simulation, DiagnosticStatus& status)
 void addTracking(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
 {
   double error = 0.0, force = 0.0, refused = 0.0;
-  const auto takeForces = [&force](const GuideState& guide) {
-    force = std::max(force, guide.forces.cols() > 0 ? guide.forces.colwise().norm().maxCoeff() : 0.0);
-  };
-  for (std::size_t k = 0; k < simulation.state().cloth_guides.size(); ++k)
+  bool bounded = false;
+  for (const GuideRef& guide : simulation.guides())
   {
-    const TrackingError now = simulation.trackingError(static_cast<int>(k));
+    const TrackingError now = simulation.trackingError(guide.object);
     error = std::max(error, now.met);
     refused = std::max(refused, now.at_bound);
-    takeForces(simulation.state().cloth_guides[k]);
-  }
-  for (std::size_t r = 0; r < simulation.state().rod_guides.size(); ++r)
-  {
-    error = std::max(error, simulation.rodTrackingError(static_cast<int>(r)));
-    takeForces(simulation.state().rod_guides[r]);
+    force = std::max(force, simulation.state().guide(guide.object).forces.colwise().norm().maxCoeff());
+    bounded = bounded || guide.tracking->sets[0].bounds.size() > 0;
   }
   add(status, "constraint residual [m]", error);
   add(status, "worst constraint residual over size", recent.tracking_error);
   add(status, "largest guide force [N]", force);
-  for (std::size_t k = 0; k < simulation.config().cloths.size(); ++k)
-    addFunctions(simulation, static_cast<int>(k), status);
-  const auto& cloths = simulation.config().cloths;
-  if (std::any_of(cloths.begin(), cloths.end(),
-                  [](const ClothConfig& cloth) { return cloth.tracking && cloth.tracking->sets[0].bounds.size() > 0; }))
+  for (const GuideRef& guide : simulation.guides())
+    addFunctions(simulation, guide, status);
+  if (bounded)
   {
     add(status, "most guide forces at their bounds", recent.forces_at_bound);
     add(status, "greatest distance where forces are at their bounds [m]", refused);
@@ -312,7 +303,7 @@ DiagnosticStatus SceneNode::simulationStatus() const
     add(status, "projection iterations", recent_.projection_iterations);
     add(status, "constraint error", recent_.constraint_error);
   }
-  if (tracksGuide(simulation_->config().cloths) || tracksGuide(simulation_->config().rods))
+  if (!simulation_->guides().empty())
     addTracking(*simulation_, recent_, status);
   if (topics_->has_cloths)
     addCloths(*simulation_, recent_, status);

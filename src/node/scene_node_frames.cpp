@@ -24,15 +24,9 @@ void visitFollowers(const Simulation& simulation, const std::vector<std::string>
   for (const ThreadConfig& thread : scene.threads)
     if (thread.nozzle)
       look(thread.nozzle->motion, "the nozzle of thread " + thread.name);
-  const auto lookAtGuides = [&visit](const auto& objects) {
-    for (const auto& object : objects)
-      if (object.tracking)
-        if (const auto* carried = std::get_if<CarriedGuide>(&object.tracking->guide.motion))
-          if (carried->by_tf)
-            visit(carried->bodies.front(), "the guide of " + object.name);
-  };
-  lookAtGuides(scene.cloths);
-  lookAtGuides(scene.rods);
+  for (const auto& [object, name, tracking] : simulation.guides())
+    if (const auto* carried = std::get_if<CarriedGuide>(&tracking->guide.motion); carried && carried->by_tf)
+      visit(carried->bodies.front(), "the guide of " + name);
 }
 
 }   // namespace

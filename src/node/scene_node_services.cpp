@@ -193,15 +193,14 @@ bool SceneNode::onSetFunctions(slender_sim::SetFunctions::Request& request,
 void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request,
                              slender_sim::SetFunctions::Response& response)
 {
-  const auto& cloths = simulation_->config().cloths;
   std::string names;
   int found = -1, tracked = 0;
-  for (std::size_t k = 0; k < cloths.size(); ++k)
-    if (cloths[k].tracking)
+  for (const auto& [object, name, tracking] : simulation_->guides())
+    if (object.isCloth())
     {
-      names += " " + cloths[k].name;
-      if (cloths[k].name == request.name || (request.name.empty() && tracked == 0))
-        found = static_cast<int>(k);
+      names += " " + name;
+      if (name == request.name || (request.name.empty() && tracked == 0))
+        found = object.index;
       ++tracked;
     }
   response.success = false;
@@ -226,9 +225,9 @@ void SceneNode::setFunctions(const slender_sim::SetFunctions::Request& request,
 std::string SceneNode::attach(const slender_sim::SetGrasp::Request& request, int grasp,
                               slender_sim::SetGrasp::Response& response)
 {
-  const GraspRef& ref = simulation_->grasps()[grasp];
-  const bool cloth = ref.cloth >= 0;
-  const Eigen::Matrix3Xd& x = cloth ? simulation_->state().cloths[ref.cloth].x : simulation_->state().rods[ref.rod].x;
+  const ObjectRef& object = simulation_->grasps()[grasp].object;
+  const bool cloth = object.isCloth();
+  const Eigen::Matrix3Xd& x = simulation_->state().points(object);
   const int nodes = static_cast<int>(x.cols());
   std::vector<int> within;
   int first = request.first_node, last = request.last_node;

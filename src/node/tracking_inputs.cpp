@@ -30,9 +30,10 @@ void forBuffers(Guides& guides, const F& f)
   }
 }
 
-const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index, bool of_rod)
+/// `index`: of a guide of the scene.
+const Eigen::Matrix3Xd& guideNow(const Simulation& simulation, int index)
 {
-  return of_rod ? simulation.state().rod_guides[index].points : simulation.state().cloth_guides[index].points;
+  return simulation.state().guide(simulation.guides()[index].object).points;
 }
 
 }   // namespace
@@ -47,25 +48,17 @@ TrackingInputs::TrackingInputs(ros::NodeHandle& nh, const NodeOptions& options, 
     intake_(options, clock, tf, drops, kMaxPending,
             [this](const Message& message, const Pose& X_WF) { return use(message, X_WF); })
 {
-  const std::vector<ClothConfig>& cloths = simulation.config().cloths;
-  const std::vector<RodConfig>& rods = simulation.config().rods;
-  const auto tracks = [](const auto& object) { return object.tracking != nullptr; };
-  const auto tracked =
-      std::count_if(cloths.begin(), cloths.end(), tracks) + std::count_if(rods.begin(), rods.end(), tracks);
-  const auto add = [&](const auto& objects, bool of_rod) {
-    for (std::size_t k = 0; k < objects.size(); ++k)
-    {
-      Guide guide;
-      guide.index = static_cast<int>(k);
-      guide.of_rod = of_rod;
-      guide.object = objects[k].name;
-      guide.topic = tracked == 1 ? std::string() : "tracked/" + objects[k].name + "/";
-      if (objects[k].tracking && objects[k].tracking->guide.byTopic())
-        addGuide(objects[k].tracking->guide, guideNow(simulation, guide.index, of_rod), std::move(guide));
-    }
-  };
-  add(cloths, false);
-  add(rods, true);
+  const std::vector<GuideRef>& all = simulation.guides();
+  for (std::size_t k = 0; k < all.size(); ++k)
+  {
+    Guide guide;
+    guide.index = static_cast<int>(k);
+    guide.of_rod = !all[k].object.isCloth();
+    guide.object = all[k].name;
+    guide.topic = all.size() == 1 ? std::string() : "tracked/" + all[k].name + "/";
+    if (all[k].tracking->guide.byTopic())
+      addGuide(all[k].tracking->guide, guideNow(simulation, guide.index), std::move(guide));
+  }
   for (std::size_t g = 0; g < guides_.size(); ++g)
   {
     const int index = static_cast<int>(g);
@@ -236,7 +229,7 @@ void TrackingInputs::apply(double time, SceneInputs& inputs)
 {
   for (Guide& guide : guides_)
   {
-    Eigen::Matrix3Xd& vertices = (guide.of_rod ? inputs.rod_guides : inputs.guides)[guide.index];
+    Eigen::Matrix3Xd& vertices = inputs.guides[guide.index];
     if (guide.points)
       vertices = guide.points->target(time);
     else if (guide.heard())   // until then it stays
@@ -273,7 +266,7 @@ void TrackingInputs::attachAll(const Simulation& simulation)
 {
   for (Guide& guide : guides_)
   {
-    const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index, guide.of_rod);
+    const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index);
     start(guide, now);
     if (guide.points)
       guide.points->attachAt(now);
@@ -285,7 +278,7 @@ void TrackingInputs::restart(const Simulation& simulation)
   intake_.clear();
   for (Guide& guide : guides_)
   {
-    const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index, guide.of_rod);
+    const Eigen::Matrix3Xd& now = guideNow(simulation, guide.index);
     start(guide, now);
     if (guide.points)
       guide.points->restart(now);

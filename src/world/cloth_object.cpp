@@ -50,7 +50,7 @@ std::optional<StepReport> ClothObject::stepAlone()
 
 void ClothObject::finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const
 {
-  takeClothGuide(world_, index, inputs_.averages, part_->work().average_forces, inputs, state, report);
+  takeGuide(world_, {ObjectRef::cloth, index}, inputs_.averages, part_->work().average_forces, inputs, state, report);
 }
 
 void ClothObject::addTo(Meeting& meeting, const WorldState& state)

@@ -130,7 +130,7 @@ void ImpulseCloths::finish(WorldState& state)
 void ImpulseCloths::finishGuide(const WorldInputs& inputs, WorldState& state, StepReport& report) const
 {
   for (std::size_t k = 0; k < cloths_.size(); ++k)
-    takeClothGuide(world_, cloths_[k], inputs_[k].averages, average_forces_[k], inputs, state, report);
+    takeGuide(world_, {ObjectRef::cloth, cloths_[k]}, inputs_[k].averages, average_forces_[k], inputs, state, report);
 }
 
 std::size_t ImpulseCloths::indexOf(int cloth) const

@@ -59,10 +59,11 @@ void IslandScheduler::forgetContacts()
     objects_.impulses->forgetContacts();
 }
 
-/// On the surface points of an object that is one part [N].
-void IslandScheduler::addContactForces(const WorldObject& object, const Part& part, Eigen::Matrix3Xd& forces) const
+/// On the surface points of an object that is one part [N]. `count`: number of its points.
+Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const Part& part, int count) const
 {
-  const int points = part.points();
+  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, count);
+  const int points = part.points();   // 0 without contact
   for (const ObjectIsland* island : islands_)
   {
     if (points == 0 || !island->contact() ||
@@ -73,24 +74,17 @@ void IslandScheduler::addContactForces(const WorldObject& object, const Part& pa
         if (const int point = term.point[k] - part.first_point; term.point[k] >= 0 && point >= 0 && point < points)
           forces.col(point) += term.share(k, term.force);
   }
-}
-
-Eigen::Matrix3Xd IslandScheduler::rodContactForces(int number) const
-{
-  const RodObject& rod = objects_.rods.at(number);
-  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, rod.stepper->model->nodes());
-  addContactForces(rod, *rod.part, forces);
   return forces;
 }
 
-Eigen::Matrix3Xd IslandScheduler::clothContactForces(int number) const
+Eigen::Matrix3Xd IslandScheduler::contactForces(const ObjectRef& of) const
 {
-  const ClothObject* cloth = findObject(objects_.cloths, number);
-  if (!cloth)
-    return objects_.impulses->contactForces(number);
-  Eigen::Matrix3Xd forces = Eigen::Matrix3Xd::Zero(3, cloth->part().points());
-  addContactForces(*cloth, cloth->part(), forces);
-  return forces;
+  if (of.kind == ObjectRef::rod)
+    return contactForces(objects_.rods.at(of.index), *objects_.rods[of.index].part,
+                         objects_.rods[of.index].stepper->model->nodes());
+  if (const ClothObject* cloth = findObject(objects_.cloths, of.index))
+    return contactForces(*cloth, cloth->part(), cloth->part().points());
+  return objects_.impulses->contactForces(of.index);
 }
 
 ClothEnergies IslandScheduler::clothEnergies(int number, const ClothState& state, const Eigen::Vector3d& gravity) const

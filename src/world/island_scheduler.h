@@ -41,14 +41,13 @@ public:
 
   // ---- of its objects, by their numbers in the world
   RodObject& rod(int number) { return objects_.rods.at(number); }
-  Eigen::Matrix3Xd rodContactForces(int number) const;   ///< on its nodes [N]
   ClothEnergies clothEnergies(int number, const ClothState& state, const Eigen::Vector3d& gravity) const;
   const Eigen::Matrix3Xd& pinForces(int number) const;
-  Eigen::Matrix3Xd clothContactForces(int number) const;   ///< on its vertices [N]
+  Eigen::Matrix3Xd contactForces(const ObjectRef& of) const;   ///< on the nodes of a rod, the vertices of a cloth [N]
 
 private:
   void checkIntegrator() const;
-  void addContactForces(const WorldObject& object, const Part& part, Eigen::Matrix3Xd& forces) const;
+  Eigen::Matrix3Xd contactForces(const WorldObject& object, const Part& part, int count) const;
   void checkClearance(WorldState& state);
   void fitRanges(const Meeting& meeting, WorldState& state);
 

@@ -78,7 +78,7 @@ void ObjectIsland::addSurface(WorldObject& object)
   if (dynamic_cast<ThreadObject*>(&object))
     return;
   const bool is_body = dynamic_cast<BodyObject*>(&object), is_rod = dynamic_cast<RodObject*>(&object);
-  partners_.push_back({is_body ? ContactPartner::body : is_rod ? ContactPartner::rod : ContactPartner::cloth, index});
+  partners_.push_back({is_body ? ObjectRef::body : is_rod ? ObjectRef::rod : ObjectRef::cloth, index});
   if (!is_body)   // A body is touched as a solid.
     numbers_.emplace_back(partners_.back(), number);
 }
@@ -195,7 +195,7 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
 }
 
 /// Returns the number of a rod, a cloth or a solid in the contact of the island; -1: the island does not have it.
-int ObjectIsland::numberOf(const ContactPartner& partner) const
+int ObjectIsland::numberOf(const ObjectRef& partner) const
 {
   const auto at = std::lower_bound(numbers_.begin(), numbers_.end(), std::make_pair(partner, 0));
   return at == numbers_.end() || !(at->first == partner) ? -1 : at->second;
@@ -228,7 +228,7 @@ void ObjectIsland::takeSprings(WorldState& state)
     for (const ContactSpring& spring : surfaces_[k]->contact(state).springs)
     {
       const int number = numberOf(spring.partner);
-      const bool is_solid = spring.partner.kind >= ContactPartner::body;
+      const bool is_solid = spring.partner.kind >= ObjectRef::body;
       if (number >= 0)
         island_.springs.push_back({static_cast<int>(k), is_solid ? -1 : number, is_solid ? number : -1, spring.piece,
                                    spring.point, spring.tension});

@@ -50,7 +50,7 @@ private:
   void setSolids(const WorldState& state, const WorldInputs& inputs);
   void setParts();
   void setStrands();
-  int numberOf(const ContactPartner& partner) const;
+  int numberOf(const ObjectRef& partner) const;
   void takeRanges(WorldState& state);
   void takeSprings(WorldState& state);
   void giveSprings(WorldState& state) const;
@@ -68,9 +68,9 @@ private:
   std::vector<BodyObject*> bodies_;
   std::vector<const WorldSolid*> solids_;   ///< that its parts may touch
   std::vector<WorldObject*> surfaces_;      ///< objects with a surface, in the order of those of the contact
-  std::vector<ContactPartner> partners_;    ///< these, as far as they are no threads, which come last
+  std::vector<ObjectRef> partners_;         ///< these, as far as they are no threads, which come last
   /// Numbers of surfaces and solids in the contact, sorted by what they are.
-  std::vector<std::pair<ContactPartner, int>> numbers_;
+  std::vector<std::pair<ObjectRef, int>> numbers_;
   std::vector<std::vector<std::pair<int, double>>> ranges_;   ///< per solid, see ContactSolid::ranges
   int nodes_ = 0;                                             ///< of its rods
   ThreadGuard guard_;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "meeting.h"
+#include "tracked_parts.h"
 
 namespace slender {
 
@@ -47,9 +48,8 @@ RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time
     part(std::make_unique<RodPart>(*stepper, touches(world.rods[number]),
                                    constraints ? &constraints->matrix() : nullptr)),
     meets(meetsOthers(world, number)),
-    contact_(world.rods[number].contact),
-    guide_size_(world.rods[number].tracked.size),
-    duration_(world.time.step)
+    world_(world),
+    contact_(world.rods[number].contact)
 {
   if (constraints)
     checkTracking(world.time, stepper->model->name);
@@ -59,10 +59,10 @@ RodObject::RodObject(const WorldModel& world, int number, const TimeConfig& time
 
 bool RodObject::load(const WorldState& state, const WorldInputs& with, StepReport& report)
 {
-  stepper->begin(state.rods[index], inputs, duration_);
+  stepper->begin(state.rods[index], inputs, world_.time.step);
   if (!constraints)
     return true;
-  constraints->averages(with.rod_guides[index], targets_);
+  takeTargets(world_, {ObjectRef::rod, index}, state, with, targets_);
   if (!targets_.allFinite())
     return refuseInput(name() + ": its guide", report);
   part->averages()->begin(state.rods[index].x, targets_);
@@ -71,12 +71,8 @@ bool RodObject::load(const WorldState& state, const WorldInputs& with, StepRepor
 
 void RodObject::finishGuide(const WorldInputs& with, WorldState& state, StepReport& report) const
 {
-  if (!constraints)
-    return;
-  state.rod_guides[index].points = with.rod_guides[index];
-  state.rod_guides[index].forces = part->averages()->forces;
-  report.tracking_error =
-      std::max(report.tracking_error, constraints->error(targets_, state.rods[index].x) / guide_size_);
+  if (constraints)
+    takeGuide(world_, {ObjectRef::rod, index}, targets_, part->averages()->forces, with, state, report);
 }
 
 void RodObject::addTo(Meeting& meeting, const WorldState& state)

@@ -34,10 +34,9 @@ public:
   const bool meets;   ///< contact or welds may let it meet others
 
 private:
+  const WorldModel& world_;
   const std::optional<ContactProperties>& contact_;
   Eigen::Matrix3Xd targets_;   ///< of its averages at the end of the step [m]
-  const double guide_size_;    ///< [m]
-  const double duration_;      ///< of a step [s]
 };
 
 /// Returns true if contact or welds may let a rod meet something.

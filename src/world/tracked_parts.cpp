@@ -13,17 +13,23 @@ bool isDue(const FunctionSet& set, std::uint64_t steps, double step)
   return set.from && std::ceil(*set.from / step - 1e-6) == static_cast<double>(steps);
 }
 
-const Eigen::Matrix3Xd& guideOf(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs)
+const Eigen::Matrix3Xd& guideOf(const TrackedGuide& tracked, const WorldState& state, const WorldInputs& inputs)
 {
-  const int leader = model.cloths[cloth].tracked.leader;
-  return leader >= 0 ? state.cloths[leader].x : inputs.cloth_guides[cloth];
+  return tracked.leader >= 0 ? state.cloths[tracked.leader].x : inputs.guides[tracked.input];
 }
 
 }   // namespace
 
-const FunctionSet& functionsOf(const TrackedGuide& tracked, const ClothState& cloth)
+const FunctionSet& functionsOf(const WorldModel& model, const ObjectRef& part, const WorldState& state)
 {
-  return tracked.sets->at(static_cast<std::size_t>(cloth.average_set));
+  return model.tracked(part).sets->at(part.isCloth() ? state.cloths[part.index].average_set : 0);
+}
+
+void takeTargets(const WorldModel& model, const ObjectRef& part, const WorldState& state, const WorldInputs& inputs,
+                 Eigen::Matrix3Xd& targets)
+{
+  functionsOf(model, part, state).constraints->averages(guideOf(model.tracked(part), state, inputs), targets);
+  state.guide(part).blend.apply(static_cast<double>(state.steps + 1) * model.time.step, targets);
 }
 
 void takeClothInputs(const WorldModel& model, int cloth, const WorldState& state, const WorldInputs& inputs,
@@ -34,48 +40,46 @@ void takeClothInputs(const WorldModel& model, int cloth, const WorldState& state
   to.gravity = from.gravity;
   to.wind = from.wind;
   to.forces = from.forces;
-  if (!model.cloths[cloth].tracked.sets)
-  {
+  if (model.cloths[cloth].tracked.sets)
+    takeTargets(model, {ObjectRef::cloth, cloth}, state, inputs, to.averages);
+  else
     to.averages = from.averages;
-    return;
-  }
-  functionsOf(model.cloths[cloth].tracked, state.cloths[cloth])
-      .constraints->averages(guideOf(model, cloth, state, inputs), to.averages);
-  state.cloth_guides[cloth].blend.apply(static_cast<double>(state.steps + 1) * model.time.step, to.averages);
 }
 
-TrackingError errorOf(const TrackedGuide& tracked, const ClothState& cloth, const GuideState& guide, double time,
+TrackingError errorOf(const WorldModel& model, const ObjectRef& part, const WorldState& state,
                       const Eigen::Matrix3Xd& targets)
 {
-  const WeakConstraints& constraints = *functionsOf(tracked, cloth).constraints;
+  static const std::vector<int> none;
+  const WeakConstraints& constraints = *functionsOf(model, part, state).constraints;
+  const Eigen::Matrix3Xd& x = state.points(part);
+  const std::vector<int>& at_bound = part.isCloth() ? state.cloths[part.index].at_bound : none;
   TrackingError error;
-  error.blend = guide.blend.left(time);
+  error.blend = state.guide(part).blend.left(state.time);
   for (int i = 0; i < constraints.count(); ++i)
   {
-    double& worst = std::binary_search(cloth.at_bound.begin(), cloth.at_bound.end(), i) ? error.at_bound : error.met;
-    worst = std::max(worst, constraints.distance(i, targets, cloth.x));
+    double& worst = std::binary_search(at_bound.begin(), at_bound.end(), i) ? error.at_bound : error.met;
+    worst = std::max(worst, constraints.distance(i, targets, x));
   }
   return error;
 }
 
-void takeClothGuide(const WorldModel& model, int cloth, const Eigen::Matrix3Xd& targets, const Eigen::Matrix3Xd& forces,
-                    const WorldInputs& inputs, WorldState& state, StepReport& report)
+void takeGuide(const WorldModel& model, const ObjectRef& part, const Eigen::Matrix3Xd& targets,
+               const Eigen::Matrix3Xd& forces, const WorldInputs& inputs, WorldState& state, StepReport& report)
 {
-  const TrackedGuide& tracked = model.cloths[cloth].tracked;
+  const TrackedGuide& tracked = model.tracked(part);
   if (!tracked.sets)
     return;
-  GuideState& held = state.cloth_guides[cloth];
-  const Eigen::Matrix3Xd& guide = guideOf(model, cloth, state, inputs);
+  GuideState& held = state.guide(part);
+  const Eigen::Matrix3Xd& guide = guideOf(tracked, state, inputs);
   if (tracked.sets->size() > 1)
     held.velocity = (guide - held.points) / model.time.step;
   held.points = guide;
   if (!held.blend.active(state.time))
     held.blend = FunctionBlend();
   held.forces = forces;
-  const ClothState& moved = state.cloths[cloth];
-  report.tracking_error =
-      std::max(report.tracking_error, errorOf(tracked, moved, held, state.time, targets).met / tracked.size);
-  report.forces_at_bound += static_cast<int>(moved.at_bound.size());
+  report.tracking_error = std::max(report.tracking_error, errorOf(model, part, state, targets).met / tracked.size);
+  if (part.isCloth())
+    report.forces_at_bound += static_cast<int>(state.cloths[part.index].at_bound.size());
 }
 
 /// The guide's speed is that of the last step, as the cloth's is: where it jumped just then the cloth did, too.

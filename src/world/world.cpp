@@ -128,9 +128,10 @@ RodStepper* World::rodStepper(int rod) { return impl_->ofRods().rod(rod).alone()
 
 const Eigen::Matrix3Xd& World::pinForces(int cloth) const { return impl_->of(cloth).pinForces(cloth); }
 
-Eigen::Matrix3Xd World::rodContactForces(int rod) const { return impl_->ofRods().rodContactForces(rod); }
-
-Eigen::Matrix3Xd World::clothContactForces(int cloth) const { return impl_->of(cloth).clothContactForces(cloth); }
+Eigen::Matrix3Xd World::contactForces(const ObjectRef& part) const
+{
+  return (part.isCloth() ? impl_->of(part.index) : impl_->ofRods()).contactForces(part);
+}
 
 ClothEnergies World::clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const
 {
@@ -151,9 +152,9 @@ void World::forgetContacts()
     scheduler->forgetContacts();
 }
 
-const FunctionSet& World::functions(int cloth, const WorldState& state) const
+const FunctionSet& World::functions(const ObjectRef& part, const WorldState& state) const
 {
-  return functionsOf(impl_->model.cloths.at(cloth).tracked, state.cloths[cloth]);
+  return functionsOf(model(), part, state);
 }
 
 void World::setFunctions(int cloth, std::size_t set, double blend, WorldState& state) const
@@ -170,24 +171,13 @@ void World::setFunctions(int cloth, std::size_t set, double blend, WorldState& s
   takeOver(tracked, set, blend, state.time, held, state.cloth_guides[cloth]);
 }
 
-TrackingError World::clothTrackingError(int cloth, const WorldState& state) const
+TrackingError World::trackingError(const ObjectRef& part, const WorldState& state) const
 {
-  const TrackedGuide& tracked = impl_->model.cloths.at(cloth).tracked;
-  if (!tracked.sets)
+  if (!model().tracked(part).sets)
     return TrackingError();
-  const GuideState& guide = state.cloth_guides[cloth];
-  Eigen::Matrix3Xd targets = functions(cloth, state).constraints->averages(guide.points);
-  guide.blend.apply(state.time, targets);
-  return errorOf(tracked, state.cloths[cloth], guide, state.time, targets);
-}
-
-double World::rodTrackingError(int rod, const WorldState& state) const
-{
-  const TrackedGuide& tracked = impl_->model.rods.at(rod).tracked;
-  if (!tracked.sets)
-    return 0.0;
-  const WeakConstraints& constraints = *tracked.sets->front().constraints;
-  return constraints.error(constraints.averages(state.rod_guides[rod].points), state.rods[rod].x);
+  Eigen::Matrix3Xd targets = functions(part, state).constraints->averages(state.guide(part).points);
+  state.guide(part).blend.apply(state.time, targets);
+  return errorOf(model(), part, state, targets);
 }
 
 }   // namespace slender

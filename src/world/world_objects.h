@@ -33,10 +33,7 @@ struct WorldSolid
   std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
 
   /// Not of a floor.
-  ContactPartner partner() const
-  {
-    return {kind == Kind::body ? ContactPartner::body : ContactPartner::obstacle, index};
-  }
+  ObjectRef partner() const { return {kind == Kind::body ? ObjectRef::body : ObjectRef::obstacle, index}; }
   /// For a contact of these objects, without the pose.
   ContactSolid asTouched(const std::vector<WorldObject*>& by) const;
 };

@@ -50,23 +50,22 @@ TEST(AverageConstraints, AreMetAndCarryTheRod)
   {
     Simulation s(parseScene(scene, "rope"));
     SceneInputs inputs = s.defaultInputs();
-    const Matrix3Xd start = inputs.rod_guides[0];
+    const Matrix3Xd start = inputs.guides[0];
     for (int k = 0; k < 1500; ++k)
     {
       const double t = std::min(0.01 * k, 5.0), share = std::min(t, 1.0);
       for (Eigen::Index i = 0; i < start.cols(); ++i)
-        inputs.rod_guides[0].col(i) =
-            start.col(i) + Vector3d(0, 0.05 * std::sin(2 * t + 0.17 * i) * share, 0.1 * share);
+        inputs.guides[0].col(i) = start.col(i) + Vector3d(0, 0.05 * std::sin(2 * t + 0.17 * i) * share, 0.1 * share);
       const StepReport report = s.step(inputs);
       ASSERT_TRUE(report.ok) << k << ": " << report.message;
-      ASSERT_LT(s.rodTrackingError(0), 1e-13) << k;
+      ASSERT_LT(s.trackingError({ObjectRef::rod, 0}).met, 1e-13) << k;
     }
     // at rest, averages carry the weight
     const double weight = 9.81 * s.rodModel(0).totalMass();
     EXPECT_LT(s.state().rods[0].v.cwiseAbs().maxCoeff(), 1e-4);
     EXPECT_LT((guideForce(s, 0) - Vector3d(0, 0, weight)).norm(), 1e-3 * weight);
     // between the averages it has a shape of its own
-    EXPECT_GT((s.state().rods[0].x - inputs.rod_guides[0]).colwise().norm().maxCoeff(), 1e-3);
+    EXPECT_GT((s.state().rods[0].x - inputs.guides[0]).colwise().norm().maxCoeff(), 1e-3);
   }
 }
 
@@ -89,7 +88,7 @@ TEST(AverageConstraints, LeaveAFreeMotionAlone)
       for (int k = 0; k < 40; ++k)
       {
         ASSERT_TRUE(free.step(free.defaultInputs()).ok);
-        inputs.rod_guides[0] = free.state().rods[0].x;
+        inputs.guides[0] = free.state().rods[0].x;
         const StepReport report = tracked.step(inputs);
         ASSERT_TRUE(report.ok) << report.message;
         ASSERT_LT((tracked.state().rods[0].x - free.state().rods[0].x).cwiseAbs().maxCoeff(), 1e-6) << grasps << k;
@@ -113,7 +112,7 @@ TEST(AverageConstraints, ThatDependOnEachOtherAreRefused)
   WorldInputs inputs;
   inputs.rods.resize(1);
   inputs.rods[0].grasps.push_back({state.rods[0].grasps[0].X_WG, std::nullopt});
-  inputs.rod_guides.push_back(s.state().rods[0].x);
+  inputs.guides.push_back(s.state().rods[0].x);
   const Matrix3Xd before = state.rods[0].x;
   World world(model, state);
   const StepReport report = world.step(state, inputs);
@@ -135,7 +134,7 @@ TEST(AverageConstraints, ThatAFloorDoesNotAllowAreRefused)
   for (int k = 0; k < 100 && report.ok; ++k)
   {
     lowest = s.state().rods[0].x.row(2).minCoeff();
-    inputs.rod_guides[0].row(2).array() -= 0.001;
+    inputs.guides[0].row(2).array() -= 0.001;
     report = s.step(inputs);
   }
   EXPECT_FALSE(report.ok);
@@ -251,8 +250,8 @@ struct Other
 };
 void PrintTo(const Other& other, std::ostream* out) { *out << other.name; }
 
-/// Lifts what tracks a guide into what lies above. The averages stay exact. Only the forces of the guides change the
-/// total momentum, if there is no obstacle.
+/// Lifts cloths that track a guide into what lies above. The averages stay exact. Only the forces of the guides change
+/// the total momentum, if there is no obstacle.
 void lift(const std::string& scene, bool touches)
 {
   Simulation s(parseScene(scene, "lifted"));
@@ -265,7 +264,7 @@ void lift(const std::string& scene, bool touches)
   {
     inputs = s.defaultInputs();
     for (std::size_t c = 0; c < guides.size(); ++c)
-      for (Eigen::Index i = 0; i < guides[c].cols(); ++i)
+      for (Eigen::Index i = 0; s.guides()[c].object.isCloth() && i < guides[c].cols(); ++i)
         inputs.guides[c](2, i) = guides[c](2, i) + 5e-5 * (k + 1) * (1.0 + 25.0 * guides[c](0, i));
     const Vector3d before = momentum(s);
     const StepReport report = s.step(inputs);
@@ -278,14 +277,14 @@ void lift(const std::string& scene, bool touches)
     };
     for (std::size_t r = 0; r < s.state().rods.size(); ++r)
     {
-      ASSERT_LT(s.rodTrackingError(static_cast<int>(r)), 1e-10 * 0.04) << k;
+      ASSERT_LT(s.trackingError({ObjectRef::rod, static_cast<int>(r)}).met, 1e-10 * 0.04) << k;
       if (s.config().rods[r].tracking)
         add(s.state().rod_guides[r].forces);
     }
     for (std::size_t c = 0; c < s.state().cloths.size(); ++c)
       if (s.config().cloths[c].tracking)
       {
-        ASSERT_LT(s.trackingError(static_cast<int>(c)).met, 1e-10 * 0.04) << k;
+        ASSERT_LT(s.trackingError({ObjectRef::cloth, static_cast<int>(c)}).met, 1e-10 * 0.04) << k;
         add(s.state().cloth_guides[c].forces);
       }
     // Newton's method leaves up to this part of the largest force unbalanced

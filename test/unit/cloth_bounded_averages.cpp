@@ -45,7 +45,7 @@ struct Bounded
     sets->front().constraints = std::make_shared<WeakConstraints>(constraints);
     g.model.cloths[0].tracked.sets = sets;
     g.state.cloth_guides.resize(1);
-    g.inputs.cloth_guides.resize(1);
+    g.inputs.guides.resize(1);
     g.addObstacle(solid, {at, Eigen::Quaterniond::Identity()});
     return g;
   }
@@ -207,7 +207,7 @@ TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
     ImpulseCloths cloths(g.model, {0});
     for (int k = 1; k <= 20; ++k)
     {
-      g.inputs.cloth_guides[0] = t.coarse.vertices.colwise() - Vector3d(0, 0, 0.002 * k);
+      g.inputs.guides[0] = t.coarse.vertices.colwise() - Vector3d(0, 0, 0.002 * k);
       StepReport report;
       ASSERT_TRUE(cloths.load(g.state, g.inputs, report));
       report = *cloths.stepAlone();
@@ -216,7 +216,7 @@ TEST(BoundedAverages, AreGivenUpWhereCollisionsForbidThem)
       EXPECT_GT(g.state.cloths[0].x.row(2).minCoeff(), -0.01);
       EXPECT_LT(cloths.collisions().rounds, 60) << traction << " step " << k;
     }
-    EXPECT_GT(t.constraints.error(t.constraints.averages(g.inputs.cloth_guides[0]), g.state.cloths[0].x), 0.029);
+    EXPECT_GT(t.constraints.error(t.constraints.averages(g.inputs.guides[0]), g.state.cloths[0].x), 0.029);
     EXPECT_EQ(g.state.cloths[0].at_bound.size(), traction > 0 ? 25u : 0u);
   }
 }
@@ -277,7 +277,7 @@ TEST(BoundedAverages, HoldInContactWhateverTheTolerance)
     double greatest = 0.0;
     for (int k = 1; k <= 40; ++k)
     {
-      g.inputs.cloth_guides[0] = t.coarse.vertices.colwise() - Vector3d(0, 0, 0.003 * k);
+      g.inputs.guides[0] = t.coarse.vertices.colwise() - Vector3d(0, 0, 0.003 * k);
       const StepReport report = world.step(g.state, g.inputs);
       ASSERT_TRUE(report.ok) << report.message;
       contacts += report.repulsions;

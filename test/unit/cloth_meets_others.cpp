@@ -95,7 +95,7 @@ TEST(ClothMeetsOthers, RopeAndBallKeepTheThickness)
   EXPECT_GE(most, 10u);
   // The ball has not passed the sheet, which the rope carries. Without them it would have fallen by 0.39 m.
   EXPECT_GT(s.state().bodies[0].X_WB.position.z(), -0.2);
-  EXPECT_LT(s.world().rodContactForces(0).row(2).sum(), 0.0);
+  EXPECT_LT(s.world().contactForces({ObjectRef::rod, 0}).row(2).sum(), 0.0);
 }
 
 /// Momentum is kept, whether the equations are solved by factors or by sweeps.
@@ -118,7 +118,7 @@ TEST_P(ClothAndBall, WhatOneLosesTheOtherGets)
     const Vector3d ball_before = s.state().bodies[0].velocity.linear;
     ASSERT_TRUE(s.step(s.defaultInputs()).ok) << k;
     const Vector3d gained = kBallMass * (s.state().bodies[0].velocity.linear - ball_before);
-    const Vector3d lost = 0.004 * s.world().clothContactForces(0).rowwise().sum();
+    const Vector3d lost = 0.004 * s.world().contactForces({ObjectRef::cloth, 0}).rowwise().sum();
     // Newton's increments of 1e-6 of an edge leave this much of the forces of a stiff sheet
     EXPECT_LT((gained + lost).norm(), 1e-5 * kBallMass)
         << k << " " << gained.transpose() << " lost " << lost.transpose() << " terms " << s.world().contacts().size();

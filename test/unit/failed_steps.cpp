@@ -455,7 +455,7 @@ TEST(FailedSteps, RefusalsOfRodsWithAveragesLeaveNothing)
   state.rod_guides.resize(1);
   WorldInputs inputs;
   inputs.rods.resize(1);
-  inputs.rod_guides = {start.x};
+  inputs.guides = {start.x};
   WorldInputs spoilt = inputs;
   spoilt.rods[0].forces.setZero(3, n);
   spoilt.rods[0].forces.col(7) << 0, 1e300, -1e300;

@@ -50,7 +50,7 @@ TEST(ImpulseCloths, ContactForcesBalanceMomentum)
     {
       const ClothModel& model = c.cloth(i);
       const auto& x = c.state.cloths[static_cast<std::size_t>(i)];
-      const Matrix3Xd contact = world.clothContactForces(i);
+      const Matrix3Xd contact = world.contactForces({ObjectRef::cloth, i});
       Vector3d forces = -world.pinForces(i).rowwise().sum(), change(0, 0, 0);
       for (int v = 0; v < model.vertices(); ++v)
       {

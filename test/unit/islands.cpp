@@ -221,7 +221,7 @@ TEST(IslandScheduler, IslandsDoNotDependOnTheNumberOfThreads)
     Eigen::Matrix3Xd from_first = one.state().rods[r].x - one.state().rods[0].x;
     from_first.row(1).array() -= 0.1 * static_cast<double>(r);
     EXPECT_LT(from_first.cwiseAbs().maxCoeff(), 1e-7) << r;   // rounding, which contact amplifies
-    EXPECT_GT(one.world().rodContactForces(static_cast<int>(r)).row(2).sum(), 0.0) << r;
+    EXPECT_GT(one.world().contactForces({ObjectRef::rod, static_cast<int>(r)}).row(2).sum(), 0.0) << r;
   }
 }
 

@@ -52,7 +52,7 @@ TEST(Simulation, buildsWhatTheSceneSays)
 {
   const Simulation simulation = twoRodSimulation();
   ASSERT_EQ(simulation.grasps().size(), 3u);
-  EXPECT_EQ(simulation.grasps()[2].rod, 1);
+  EXPECT_EQ(simulation.grasps()[2].object.index, 1);
   EXPECT_EQ(simulation.grasps()[2].index, 0);
   EXPECT_EQ(simulation.grasps()[2].config->name, "b_left");
   EXPECT_NEAR(simulation.rodModel(0).totalMass(), 1000 * M_PI * 0.005 * 0.005, 1e-12);

@@ -179,7 +179,7 @@ TEST(TrackedRodAllocations, AWarmStepMakesNone)
     bool ok = true;
     const auto advance = [&] {
       simulation.defaultInputs(inputs);
-      inputs.rod_guides[0].row(1).array() += 1e-3;
+      inputs.guides[0].row(1).array() += 1e-3;
       ok = simulation.step(inputs).ok && ok;
     };
     for (int k = 0; k < 20; ++k)

@@ -103,7 +103,7 @@ protected:
 TEST_F(TrackedFunctions, AreExactAfterTheBlend)
 {
   Simulation simulation(scene());
-  EXPECT_EQ(simulation.functions(0).name, "coarse");
+  EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "coarse");
   run(simulation, 120);
   EXPECT_LT(away(simulation, 0), 1e-14);
   const double gap = away(simulation, 1);
@@ -115,13 +115,13 @@ TEST_F(TrackedFunctions, AreExactAfterTheBlend)
     const StepReport report = simulation.step(simulation.defaultInputs());
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-13) << k;   // of what the blend leaves to do
-    const TrackingError error = simulation.trackingError(0);
+    const TrackingError error = simulation.trackingError({ObjectRef::cloth, 0});
     EXPECT_NEAR(error.blend, away(simulation, 1), 1e-13) << k;
     if (k > 20)   // the rate's part is over
       EXPECT_LT(error.blend, before) << k;
     EXPECT_LT(error.blend, 1.5 * gap) << k;
     before = error.blend;
-    EXPECT_EQ(simulation.functions(0).name, "fine");
+    EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "fine");
     EXPECT_EQ(simulation.state().cloth_guides[0].blend.gap.cols(), k < 60 ? 25 : 0) << k;
   }
   EXPECT_EQ(before, 0.0);
@@ -152,7 +152,7 @@ TEST_F(TrackedFunctions, TakeOverWithoutAJump)
     }
     jump[blended] = (rates(simulation) - v).colwise().norm().maxCoeff();
     shift[blended] = (simulation.state().cloths[0].x - x).colwise().norm().maxCoeff();
-    EXPECT_EQ(simulation.functions(0).name, "fine");
+    EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "fine");
     if (!blended)
       EXPECT_LT(away(simulation, 1), 1e-14);   // at once
   }
@@ -187,10 +187,10 @@ TEST_F(TrackedFunctions, RestartExactlyInTheMiddleOfABlend)
   {
     Simulation one(scene(set)), two(scene(set));
     run(one, 150);
-    EXPECT_GT(one.trackingError(0).blend, 1e-4);
+    EXPECT_GT(one.trackingError({ObjectRef::cloth, 0}).blend, 1e-4);
     one.save(folder_ + "/state");
     two.load(folder_ + "/state");
-    EXPECT_EQ(two.functions(0).name, "fine");
+    EXPECT_EQ(two.functions({ObjectRef::cloth, 0}).name, "fine");
     for (int k = 0; k < 60; ++k)
     {
       run(one, 1);
@@ -200,11 +200,11 @@ TEST_F(TrackedFunctions, RestartExactlyInTheMiddleOfABlend)
       ASSERT_TRUE(one.state().cloth_guides[0].forces == two.state().cloth_guides[0].forces) << k;
     }
     two.reset();
-    EXPECT_EQ(two.functions(0).name, "coarse");
+    EXPECT_EQ(two.functions({ObjectRef::cloth, 0}).name, "coarse");
     Simulation fresh(scene(set));
     run(two, 125);   // past the switch again
     run(fresh, 125);
-    EXPECT_EQ(two.functions(0).name, "fine");
+    EXPECT_EQ(two.functions({ObjectRef::cloth, 0}).name, "fine");
     EXPECT_TRUE(two.state().cloths[0].x == fresh.state().cloths[0].x);
   }
   // another blend is another scene
@@ -218,9 +218,9 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
   Simulation simulation(scene({"tracked.0.test_functions.1.from=1.9"}));
   run(simulation, 60);
   simulation.setFunctions(0, "fine", 0.1);
-  EXPECT_EQ(simulation.functions(0).name, "fine");
-  EXPECT_NEAR(simulation.trackingError(0).blend, away(simulation, 1), 1e-15);
-  EXPECT_LT(simulation.trackingError(0).met, 1e-15);
+  EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "fine");
+  EXPECT_NEAR(simulation.trackingError({ObjectRef::cloth, 0}).blend, away(simulation, 1), 1e-15);
+  EXPECT_LT(simulation.trackingError({ObjectRef::cloth, 0}).met, 1e-15);
   run(simulation, 10);
   EXPECT_GT(away(simulation, 1), 1e-4);
   // within a blend, to one function, and back
@@ -230,7 +230,7 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
   EXPECT_LT(away(simulation, 2), 1e-14);
   EXPECT_GT(away(simulation, 0), 1e-4);
   simulation.setFunctions(0, "coarse", 0.0);
-  EXPECT_EQ(simulation.trackingError(0).blend, 0.0);
+  EXPECT_EQ(simulation.trackingError({ObjectRef::cloth, 0}).blend, 0.0);
   run(simulation, 1);
   EXPECT_LT(away(simulation, 0), 1e-14);
   run(simulation, 20);   // the speed of that step is gone
@@ -243,7 +243,7 @@ TEST_F(TrackedFunctions, AreSwitchedByRequest)
     run(*each, 10);
   EXPECT_LT((simulation.state().cloths[0].x - same.state().cloths[0].x).cwiseAbs().maxCoeff(), 1e-5);
   // a blend of rounding errors, and of what velocities are not differences of positions
-  EXPECT_LT(same.trackingError(0).blend, 1e-5);
+  EXPECT_LT(same.trackingError({ObjectRef::cloth, 0}).blend, 1e-5);
 
   const auto refused = [](Simulation& s, const std::string& set, std::optional<double> blend) -> std::string {
     const SceneState before = s.state();
@@ -279,9 +279,9 @@ TEST_F(TrackedFunctions, OfSeveralThatAreDueInAStepTheLatestActs)
 {
   Simulation simulation(scene({"tracked.0.test_functions.1.from=0.604", "tracked.0.test_functions.2.from=0.602"}));
   run(simulation, 121);
-  EXPECT_EQ(simulation.functions(0).name, "coarse");
+  EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "coarse");
   run(simulation, 1);
-  EXPECT_EQ(simulation.functions(0).name, "fine");
+  EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "fine");
 }
 
 TEST_F(TrackedFunctions, OneSetOfAListIsAsWithoutList)
@@ -305,10 +305,10 @@ TEST_F(TrackedFunctions, FailedStepsLeaveTheSetAsItIs)
   SceneInputs bad = simulation.defaultInputs();
   bad.guides[0](1, 3) = NAN;
   EXPECT_FALSE(simulation.step(bad).ok);   // in which they were to change
-  EXPECT_EQ(simulation.functions(0).name, "coarse");
+  EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "coarse");
   EXPECT_TRUE(simulation.state().cloths[0].x == x && simulation.state().cloth_guides[0].forces == forces);
   run(simulation, 1);
-  EXPECT_EQ(simulation.functions(0).name, "fine");
+  EXPECT_EQ(simulation.functions({ObjectRef::cloth, 0}).name, "fine");
 }
 
 TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
@@ -323,7 +323,7 @@ TEST_F(TrackedFunctions, KeepTheirBoundsAndTouchThings)
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-11) << k;
     most = std::max(most, report.forces_at_bound);
-    const FunctionSet& set = bounded.functions(0);
+    const FunctionSet& set = bounded.functions({ObjectRef::cloth, 0});
     const Eigen::VectorXd over =
         bounded.state().cloth_guides[0].forces.colwise().norm().transpose().array() / set.bounds.array();
     EXPECT_LT(over.maxCoeff(), 1.0011) << k;   // contact may go over by a thousandth

@@ -68,7 +68,7 @@ protected:
   static StepReport step(Simulation& simulation, const Matrix3Xd& guide)
   {
     SceneInputs inputs = simulation.defaultInputs();
-    inputs.rod_guides[0] = guide;
+    inputs.guides[0] = guide;
     return simulation.step(inputs);
   }
 
@@ -101,7 +101,7 @@ TEST_F(TrackedRods, AreReadWithDefaults)
         "{guide: {points: [[0, 0, 1], [0.1234, 0, 1], [0.99, 0, 1], [1.2, 0, 1]]}, test_functions: {segments: 7}}"})
   {
     const Simulation simulation = make({std::string("rods.0.track=") + track});
-    EXPECT_LT(simulation.rodTrackingError(0), 1e-15) << track;
+    EXPECT_LT(simulation.trackingError({ObjectRef::rod, 0}).met, 1e-15) << track;
     EXPECT_LT((simulation.state().rods[0].x.row(2).array() - 1.0).abs().maxCoeff(), 1e-14) << track;
   }
 }
@@ -170,7 +170,7 @@ TEST_F(TrackedRods, HaveTheGuidesAveragesAfterEveryStep)
           "rods.0.centerline={arc: {center: [0, 0, 1], start: [0.2, 0, 1], axis: [0, 0, 1], angle: 6.283185307179586, "
           "edges: 60}}");
     Simulation simulation = make(set);
-    EXPECT_LT(simulation.rodTrackingError(0), kExact) << change;
+    EXPECT_LT(simulation.trackingError({ObjectRef::rod, 0}).met, kExact) << change;
     const Matrix3Xd rest = simulation.state().rod_guides[0].points;
     for (int k = 1; k <= 150; ++k)
     {
@@ -178,7 +178,7 @@ TEST_F(TrackedRods, HaveTheGuidesAveragesAfterEveryStep)
       const StepReport report = step(simulation, guide);
       ASSERT_TRUE(report.ok) << change << " " << k << ": " << report.message;
       ASSERT_LT(report.tracking_error, kExact) << change << " " << k;
-      ASSERT_LT(simulation.rodTrackingError(0), kExact * 1.3) << change;
+      ASSERT_LT(simulation.trackingError({ObjectRef::rod, 0}).met, kExact * 1.3) << change;
       ASSERT_TRUE(simulation.state().rod_guides[0].points == guide);
     }
     // the guide is held when nobody moves it, and its forces then carry what hangs from it
@@ -231,7 +231,7 @@ TEST_F(TrackedRods, StartOnTheirGuide)
   Simulation simulation =
       make({"rods.0.centerline={arc: {center: [0, 0, 1], start: [0.3, 0, 1], axis: [0, 1, 0], angle: 2.5, edges: 60}}",
             "gravity=[0, 0, 0]"});
-  EXPECT_LT(simulation.rodTrackingError(0), kExact);
+  EXPECT_LT(simulation.trackingError({ObjectRef::rod, 0}).met, kExact);
   SceneConfig config = parseScene(
       rope, "t",
       {"rods.0.centerline={arc: {center: [0, 0, 1], start: [0.3, 0, 1], axis: [0, 1, 0], angle: 2.5, edges: 60}}"});
@@ -267,17 +267,17 @@ TEST_F(TrackedRods, StandGuidesThatJump)
   SceneInputs inputs = simulation.defaultInputs();
   const SceneState before = simulation.state();
   // end for end: on the straight way there all averages meet in one point
-  inputs.rod_guides[0] = guide.rowwise().reverse();
+  inputs.guides[0] = guide.rowwise().reverse();
   const StepReport folded = simulation.step(inputs);
   EXPECT_FALSE(folded.ok);
   EXPECT_NE(folded.message.find("slower motion"), std::string::npos) << folded.message;
-  inputs.rod_guides[0](1, 3) = NAN;
+  inputs.guides[0](1, 3) = NAN;
   EXPECT_FALSE(simulation.step(inputs).ok);
   EXPECT_TRUE(simulation.state().rods[0].x == before.rods[0].x &&
               simulation.state().rod_guides[0].points == before.rod_guides[0].points);
-  inputs.rod_guides[0].resize(3, 4);
+  inputs.guides[0].resize(3, 4);
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
-  inputs.rod_guides.clear();
+  inputs.guides.clear();
   EXPECT_THROW(simulation.step(inputs), std::invalid_argument);
 }
 
@@ -334,8 +334,8 @@ TEST_F(TrackedRods, StandBesideOthersAndAreRecorded)
   }
   EXPECT_TRUE(simulation.state().rods[0].x == alone.state().rods[0].x);
   EXPECT_EQ(simulation.state().rod_guides[1].points.cols(), 0);
-  EXPECT_EQ(simulation.rodTrackingError(1), 0.0);
-  EXPECT_LT(simulation.rodTrackingError(2), kExact);
+  EXPECT_EQ(simulation.trackingError({ObjectRef::rod, 1}).met, 0.0);
+  EXPECT_LT(simulation.trackingError({ObjectRef::rod, 2}).met, kExact);
   const SceneSnapshot snapshot = snapshotOf(simulation);
   ASSERT_EQ(snapshot.functions.size(), 7u);
   EXPECT_EQ(snapshot.functions[0].object, "rope");
@@ -363,7 +363,7 @@ TEST_F(TrackedRods, RefuseGraspsThatLeaveTooLittle)
   simulation.grasps().attach(0, 20, 25, Hold::frame);
   simulation.grasps().release(0);
   ASSERT_TRUE(simulation.step(simulation.defaultInputs()).ok);
-  EXPECT_LT(simulation.rodTrackingError(0), kExact);
+  EXPECT_LT(simulation.trackingError({ObjectRef::rod, 0}).met, kExact);
 }
 
 TEST(CurveFunctions, BelongToTheCurvesLength)

@@ -182,7 +182,7 @@ TEST_F(TrackedScenes, FollowFramesFromTheGuidesShapeAndVelocity)
   const ClothState& start = simulation.state().cloths[0];
   EXPECT_TRUE(start.x.leftCols(9) == x);   // the subdivision keeps the guide's vertices
   EXPECT_TRUE(start.v.leftCols(9) == v);
-  EXPECT_LT(simulation.trackingError(0).met, 1e-14);
+  EXPECT_LT(simulation.trackingError({ObjectRef::cloth, 0}).met, 1e-14);
   double travelled = 0.0;
   for (int k = 1; k <= 60; ++k)
   {
@@ -413,13 +413,13 @@ TEST_F(TrackedScenes, LieOnAFloorThatTheirGuidesGoThrough)
       if (traction > 0 && k == 60)
       {
         EXPECT_EQ(report.forces_at_bound, 9);
-        EXPECT_NEAR(simulation.trackingError(0).at_bound, 0.032, 1e-6);
+        EXPECT_NEAR(simulation.trackingError({ObjectRef::cloth, 0}).at_bound, 0.032, 1e-6);
         EXPECT_NEAR(simulation.state().cloth_guides[0].forces.row(2).sum(), -0.16 * traction,
                     1e-9);   // traction times area
       }
     }
     EXPECT_TRUE(held.at_bound.empty());
-    EXPECT_LT(simulation.trackingError(0).met, 1e-13);
+    EXPECT_LT(simulation.trackingError({ObjectRef::cloth, 0}).met, 1e-13);
   }
 }
 
@@ -450,7 +450,7 @@ TEST_F(TrackedScenes, BoundForcesByRegion)
     ASSERT_TRUE(report.ok) << report.message;
     EXPECT_LT(report.tracking_error, 1e-13) << k;
     EXPECT_LE(one.state().cloth_guides[0].forces.col(1).norm(), tracking.sets[0].bounds[1] * (1 + 1e-9)) << k;
-    furthest = std::max(furthest, one.trackingError(0).at_bound);
+    furthest = std::max(furthest, one.trackingError({ObjectRef::cloth, 0}).at_bound);
     strain = std::max(strain, report.max_strain);
     if (k == 50)
     {
@@ -468,7 +468,7 @@ TEST_F(TrackedScenes, BoundForcesByRegion)
   EXPECT_GT(furthest, 0.3);
   EXPECT_LT(strain, 0.05);
   EXPECT_TRUE(one.state().cloths[0].at_bound.empty());
-  EXPECT_LT(one.trackingError(0).met, 1e-14);
+  EXPECT_LT(one.trackingError({ObjectRef::cloth, 0}).met, 1e-14);
   EXPECT_NE(problems({"tracked.0.max_traction={top: 30}"}).find("test function that is not there"), std::string::npos);
   EXPECT_NE(problems({"tracked.0.max_traction=0"}).find("Pa"), std::string::npos);
   EXPECT_THROW(

@@ -88,7 +88,7 @@ TEST_F(WildGuides, AreRefusedWithinTheBudgetAndTheRunGoesOn)
     EXPECT_LT(report.work, most / 50);
   }
   EXPECT_TRUE(cloth.x.allFinite() && cloth.v.allFinite());
-  EXPECT_LT(simulation.trackingError(0).met, 1e-9);
+  EXPECT_LT(simulation.trackingError({ObjectRef::cloth, 0}).met, 1e-9);
 
   // steps that were refused leave nothing behind
   Simulation calm(parseScene(kGuidedSheet, "sheet.yaml", {}));

@@ -92,7 +92,7 @@ public:
 private:
   struct Guide
   {
-    int index = 0;   // of a cloth or rod of the scene
+    int index = 0;   // of the guides of the scene
     bool of_rod = false;
     std::string topic, object;                  // object: its name
     std::unique_ptr<PointGuideBuffer> points;   // by points

@@ -8,15 +8,20 @@
 
 namespace slender {
 
-/// What a grasp of one rod holds at this instant. Part of the state because grasps come and go while running.
-struct GraspState
+/// What grasps of all kinds of objects have.
+struct GraspFrame
 {
   bool active = true;
-  int first_node = 0, last_node = 0;   ///< held nodes, first <= last; equal: a single section
-  bool holds_frame = true;             ///< false: a point pin (first == last)
-  int body = -1;                       ///< simulated body that carries it (see Weld), -1: its pose is an input
-  /// the grasp frame: origin at the (middle of the) held part, x along its tangent, y along d1
+  /// Of a rod: origin at the (middle of the) held part, x along its tangent, y along d1.
   Pose X_WG;
+};
+
+/// What a grasp of one rod holds at this instant. Part of the state because grasps come and go while running.
+struct GraspState : GraspFrame
+{
+  int first_node = 0, last_node = 0;          ///< held nodes, first <= last; equal: a single section
+  bool holds_frame = true;                    ///< false: a point pin (first == last)
+  int body = -1;                              ///< simulated body that carries it (see Weld), -1: its pose is an input
   Twist velocity;                             ///< of X_WG
   std::vector<Eigen::Vector3d> nodes_G;       ///< held nodes in the grasp frame
   std::vector<Eigen::Vector3d> directors_G;   ///< d1 of the held edges between them, in the grasp frame

@@ -20,7 +20,6 @@ struct LimitExcess
     speed
   };
   Kind kind = Kind::strain;
-  double time = 0.0;    ///< [s] simulated time of the check that found it
   double value = 0.0;   ///< in the unit of the limit
   double limit = 0.0;
   std::vector<int> to_release;   ///< grasps that `on_limit: release` releases
@@ -74,8 +73,8 @@ private:
   void checkStrains(std::vector<LimitExcess>& begun);
   template <class Stretch, class Name>
   void checkStrain(const Key& key, double limit, int edges, const Stretch& stretch, const Name& name,
-                   const std::pair<int, int>& held, std::vector<LimitExcess>& begun);
-  std::vector<int> mostLoaded(int rod, int cloth) const;
+                   const ObjectRef& object, std::vector<LimitExcess>& begun);
+  std::vector<int> mostLoaded(const ObjectRef& object) const;
 
   Simulation& simulation_;
   const LimitsConfig limits_;

@@ -70,8 +70,7 @@ private:
   GraspTarget drivenTarget(int grasp, const SceneInputs& inputs) const;
   /// Returns the target of the followed body or obstacle, or nullptr if the scene has none of this name.
   const GraspTarget* followed(const BodyMotion& motion, const SceneInputs& inputs) const;
-  GraspState& held(const GraspRef& ref) { return state_.rods[ref.rod].grasps[ref.index]; }
-  const GraspState& held(const GraspRef& ref) const { return state_.rods[ref.rod].grasps[ref.index]; }
+  GraspFrame& frameOf(const GraspRef& ref) const;
 
   const SceneConfig& config_;
   const WorldModel& model_;

@@ -8,12 +8,10 @@
 namespace slender {
 
 /// Vertices of a cloth that move as one rigid body.
-struct ClothGrasp
+struct ClothGrasp : GraspFrame
 {
-  bool active = true;
   std::vector<int> vertices;   ///< ascending; no other active grasp of the cloth holds them
   Eigen::Matrix3Xd points_G;   ///< where they are in the grasp's frame [m]
-  Pose X_WG;
 };
 
 /// State of all objects of a scene at one instant. The grasps of a rod in the scene come first in RodState::grasps.
@@ -35,27 +33,33 @@ struct ThreadDrive
   Eigen::Vector3d belt_velocity{0, 0, 0};   ///< [m/s]
 };
 
-/// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods, then all cloths).
+/// Inputs of one step, latched before it. Indices follow the scene's order of grasps (over all rods, then all
+/// cloths) and of guides (over all tracked cloths, then all tracked rods).
 struct SceneInputs
 {
   std::vector<GraspTarget> grasps;
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
-  /// per cloth of the scene: its guide's vertices at the end of the step (3 x n [m]), ignored when it is a cloth; of
-  /// others empty, and none where no cloth tracks anything
+  /// per tracked object of the scene: its guide's vertices or nodes at the end of the step (3 x n [m]), ignored when
+  /// the guide is a cloth
   std::vector<Eigen::Matrix3Xd> guides;
-  /// per rod of the scene: its guide's nodes likewise; none where no rod tracks anything
-  std::vector<Eigen::Matrix3Xd> rod_guides;
   Eigen::Vector3d wind{0, 0, 0};
 };
 
-/// A grasp of the scene: of which rod or cloth (the other is -1), which of its grasps, and its configuration.
+/// A grasp of the scene: of which rod or cloth, which of its grasps, and its configuration.
 struct GraspRef
 {
-  int rod;
+  ObjectRef object;
   int index;
   const GraspConfig* config;
-  int cloth = -1;
+};
+
+/// A guide of the scene: of which cloth or rod, the name of that, and what it follows.
+struct GuideRef
+{
+  ObjectRef object;
+  std::string name;
+  const TrackingConfig* tracking;
 };
 
 }   // namespace slender

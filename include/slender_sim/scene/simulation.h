@@ -44,14 +44,15 @@ public:
   const World& world() const { return *world_; }
   const SceneGrasps& grasps() const { return *grasps_; }
   SceneGrasps& grasps() { return *grasps_; }
+  /// The guides of all tracked objects, in the order of SceneInputs::guides.
+  const std::vector<GuideRef>& guides() const { return guides_; }
 
   const RodModel& rodModel(int rod) const { return *world_->model().rods[rod].model; }
   const ThreadModel& threadModel(int thread) const { return *world_->model().threads[thread].model; }
   const ClothModel& clothModel(int cloth) const { return *world_->model().cloths[cloth].model; }
   RodEnergies energies(int rod) const;
   ClothEnergies clothEnergies(int cloth) const;
-  TrackingError trackingError(int cloth) const { return world_->clothTrackingError(cloth, state_); }
-  double rodTrackingError(int rod) const { return world_->rodTrackingError(rod, state_); }
+  TrackingError trackingError(const ObjectRef& object) const { return world_->trackingError(object, state_); }
 
   /// Returns the inputs that the scene itself defines at the end of the coming step: tables are evaluated, all other
   /// objects stay in place.
@@ -79,8 +80,8 @@ public:
   /// state then stays.
   void reset();
 
-  /// Test functions in force of a tracked cloth.
-  const FunctionSet& functions(int cloth) const { return world_->functions(cloth, state_); }
+  /// Test functions in force of a tracked cloth or rod.
+  const FunctionSet& functions(const ObjectRef& object) const { return world_->functions(object, state_); }
   /// Uses another set of test functions from the next step on. The difference between its averages and those of the
   /// guide decreases to zero within `blend` [s] (nothing: the value of the scene), without a jump in position or
   /// velocity. With 0 this takes one step. Throws std::invalid_argument if the cloth is not tracked, if it has no set
@@ -104,6 +105,7 @@ private:
   SceneState state_, initial_;
   std::unique_ptr<World> world_;
   std::unique_ptr<SceneGrasps> grasps_;
+  std::vector<GuideRef> guides_;
   WorldInputs world_inputs_;
   std::optional<StepReport> start_report_;
   std::vector<Pose> weld_poses_;   ///< per weld of the world: initial pose of the held part in the body's frame

@@ -66,10 +66,9 @@ public:
   RodStepper* rodStepper(int rod);
 
   const Eigen::Matrix3Xd& pinForces(int cloth) const;   ///< as ClothStepper::pinForces()
-  /// Forces of contact on the vertices of a cloth in the last step (3 x vertices [N]); zero if it touches nothing.
-  Eigen::Matrix3Xd clothContactForces(int cloth) const;
-  /// The same on the nodes of a rod (3 x nodes [N]).
-  Eigen::Matrix3Xd rodContactForces(int rod) const;
+  /// Forces of contact on the vertices of a cloth or the nodes of a rod in the last step (3 x n [N]); zero if it
+  /// touches nothing.
+  Eigen::Matrix3Xd contactForces(const ObjectRef& part) const;
   ClothEnergies clothEnergies(int cloth, const ClothState& state, const Eigen::Vector3d& gravity) const;
 
   /// Contacts by the barrier in the last step.
@@ -79,15 +78,14 @@ public:
   /// All forces of contact are zero until the next step: the state has become another one.
   void forgetContacts();
 
-  /// Test functions in force of a tracked cloth.
-  const FunctionSet& functions(int cloth, const WorldState& state) const;
+  /// Test functions in force of a tracked cloth or rod.
+  const FunctionSet& functions(const ObjectRef& part, const WorldState& state) const;
   /// Has another set of test functions act from the next step on. What its averages are away from the guide's goes
   /// within `blend` [s], without a jump in position or velocity; 0: in one step. Throws std::invalid_argument for
   /// functions that depend on each other on the vertices that are free.
   void setFunctions(int cloth, std::size_t set, double blend, WorldState& state) const;
   /// Of a cloth or a rod in this state; zero for parts that track nothing.
-  TrackingError clothTrackingError(int cloth, const WorldState& state) const;
-  double rodTrackingError(int rod, const WorldState& state) const;
+  TrackingError trackingError(const ObjectRef& part, const WorldState& state) const;
 
 private:
   class Impl;

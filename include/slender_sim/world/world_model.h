@@ -12,6 +12,7 @@
 #include "slender_sim/rod/rod_model.h"
 #include "slender_sim/thread/thread_model.h"
 #include "slender_sim/tracking/function_set.h"
+#include "slender_sim/world/world_state.h"
 
 namespace slender {
 
@@ -22,6 +23,7 @@ struct TrackedGuide
   std::shared_ptr<const std::vector<FunctionSet>> sets;
   double size = 1.0;   ///< of the guide [m]; errors are reported relative to it
   int leader = -1;     ///< the cloth of the world that is the guide; -1: the guide is an input
+  int input = 0;       ///< number of the guide in WorldInputs::guides
 };
 
 /// The constant data of a world: its parts, the contacts that are possible, and the joints between parts.
@@ -82,6 +84,11 @@ struct WorldModel
 
   /// Returns true if a cloth is the guide of another one. Such cloths are stepped first and touch only each other.
   bool leads(int cloth) const;
+  /// What a rod or a cloth tracks.
+  const TrackedGuide& tracked(const ObjectRef& of) const
+  {
+    return of.isCloth() ? cloths.at(of.index).tracked : rods.at(of.index).tracked;
+  }
 };
 
 }   // namespace slender

@@ -24,25 +24,26 @@ struct GuideState
   FunctionBlend blend;         ///< of the set in force, which ClothState::average_set names
 };
 
-/// What an object touches, by its number in the world.
-struct ContactPartner
+/// An object by its number among those of its kind in the world.
+struct ObjectRef
 {
   enum Kind : int
   {
     rod,
     cloth,
-    body,   ///< its solid
+    body,   ///< where contact is meant, its solid
     obstacle
   };
   int kind = obstacle, index = 0;
-  bool operator<(const ContactPartner& b) const { return kind != b.kind ? kind < b.kind : index < b.index; }
-  bool operator==(const ContactPartner& b) const { return kind == b.kind && index == b.index; }
+  bool isCloth() const { return kind == cloth; }
+  bool operator<(const ObjectRef& b) const { return kind != b.kind ? kind < b.kind : index < b.index; }
+  bool operator==(const ObjectRef& b) const { return kind == b.kind && index == b.index; }
 };
 
 /// A spring of friction between an object and a partner, see FrictionSpring.
 struct ContactSpring
 {
-  ContactPartner partner;
+  ObjectRef partner;
   int piece = 0;
   std::array<int, 4> point{-1, -1, -1, -1};
   Eigen::Vector3d tension{0, 0, 0};   ///< [N]
@@ -51,7 +52,7 @@ struct ContactSpring
 /// An obstacle or a body that a body repels only within a share of the gap, because they started that close together.
 struct ContactRange
 {
-  ContactPartner partner;
+  ObjectRef partner;
   double share = 1.0;   ///< of the gap, in (0, 1]
 };
 
@@ -100,6 +101,15 @@ struct WorldState
   std::vector<Twist> obstacle_velocities;
   ContactMemories contact;
   std::vector<std::array<Wrench, 2>> end_loads;   ///< per thread, of the last step
+
+  /// The nodes of a rod or the vertices of a cloth [m].
+  const Eigen::Matrix3Xd& points(const ObjectRef& of) const
+  {
+    return of.isCloth() ? cloths[of.index].x : rods[of.index].x;
+  }
+  /// The guide of a rod or a cloth.
+  const GuideState& guide(const ObjectRef& of) const { return (of.isCloth() ? cloth_guides : rod_guides)[of.index]; }
+  GuideState& guide(const ObjectRef& of) { return (of.isCloth() ? cloth_guides : rod_guides)[of.index]; }
 };
 
 /// Inputs of one step, latched before it. All lists are as long as those of the model, except where something else is
@@ -112,9 +122,9 @@ struct WorldInputs
   std::vector<ClothInputs> cloths;   ///< averages of tracked cloths are ignored: they follow from the guides
   std::vector<GraspTarget> bodies;   ///< at the end of the step; simulated ones are ignored
   std::vector<GraspTarget> obstacles;
-  /// Points of the guides at the end of the step (3 x n [m]). The lists are as long as those of the state. The guide of
-  /// a cloth that follows another cloth is ignored.
-  std::vector<Eigen::Matrix3Xd> rod_guides, cloth_guides;
+  /// Points of the guides at the end of the step (3 x n [m]), see TrackedGuide::input. The guide of a cloth that
+  /// follows another cloth is ignored.
+  std::vector<Eigen::Matrix3Xd> guides;
 };
 
 }   // namespace slender

@@ -74,7 +74,7 @@ void addRod(const Simulation& simulation, int rod, const std::vector<RecordField
     columns.add({"mx [N m]", "my [N m]", "mz [N m]"}, sections.moment);
   }
   if (asks(fields, RecordField::contact_force))
-    columns.add(contact_columns, simulation.world().rodContactForces(rod));
+    columns.add(contact_columns, simulation.world().contactForces({ObjectRef::rod, rod}));
   columns.moveTo(out);
 }
 
@@ -85,7 +85,7 @@ void addCloth(const Simulation& simulation, int cloth, const std::vector<RecordF
     return;
   const ClothModel& model = simulation.clothModel(cloth);
   Columns columns("cloth_fields", model.name, model.vertices());
-  columns.add(contact_columns, simulation.world().clothContactForces(cloth));
+  columns.add(contact_columns, simulation.world().contactForces({ObjectRef::cloth, cloth}));
   columns.moveTo(out);
 }
 

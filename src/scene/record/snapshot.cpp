@@ -83,12 +83,7 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
   SceneSnapshot out;
   out.time = state.time;
   for (std::size_t r = 0; r < state.rods.size(); ++r)
-  {
     out.rods.push_back(snapshotOf(simulation.rodModel(static_cast<int>(r)), state.rods[r]));
-    if (const auto& tracking = scene.rods[r].tracking)
-      appendFunctions(scene.rods[r].name, tracking->sets.front(), state.rod_guides[r].points,
-                      state.rod_guides[r].forces, out.functions);
-  }
   for (std::size_t k = 0; k < state.threads.size(); ++k)
     for (const ThreadState& thread : state.threads[k].threads)
       out.threads.push_back(snapshotOf(simulation.threadModel(static_cast<int>(k)).name, thread));
@@ -97,12 +92,12 @@ SceneSnapshot snapshotOf(const Simulation& simulation)
     const ClothState& cloth = state.cloths[k];
     const ClothModel& model = simulation.clothModel(static_cast<int>(k));
     out.cloths.push_back({model.name, cloth.x, cloth.v, model.rest.triangles});
-    if (scene.cloths[k].tracking)
-    {
-      const GuideState& guide = state.cloth_guides[k];
-      appendFunctions(model.name, simulation.functions(static_cast<int>(k)), guide.points, guide.forces, out.functions);
-    }
   }
+  for (const bool of_cloths : {false, true})   // tables have the rods first
+    for (const auto& [object, name, tracking] : simulation.guides())
+      if (object.isCloth() == of_cloths)
+        appendFunctions(name, simulation.functions(object), state.guide(object).points, state.guide(object).forces,
+                        out.functions);
   for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
   {
     const int grasp = static_cast<int>(g);

@@ -56,7 +56,7 @@ auto fieldsOf(const RigidBodyState&)
     -> Members<&RigidBodyState::X_WB, &RigidBodyState::velocity, &RigidBodyState::last_step,
                &RigidBodyState::linear_acceleration, &RigidBodyState::angular_acceleration, &RigidBodyState::X_previous,
                &RigidBodyState::velocity_previous>;
-auto fieldsOf(const ContactPartner&) -> Members<&ContactPartner::kind, &ContactPartner::index>;
+auto fieldsOf(const ObjectRef&) -> Members<&ObjectRef::kind, &ObjectRef::index>;
 auto fieldsOf(const ContactSpring&)
     -> Members<&ContactSpring::partner, &ContactSpring::piece, &ContactSpring::point, &ContactSpring::tension>;
 auto fieldsOf(const ContactRange&) -> Members<&ContactRange::partner, &ContactRange::share>;

@@ -76,15 +76,12 @@ void addCloth(SceneConfig& scene, int k, SceneParts& parts)
   {
     checkVertices(config.grasps[g].vertices, config, state, grasps, g);
     grasps.push_back(clothGraspOf(state, config.grasps[g].vertices));
-    parts.grasps.push_back({-1, static_cast<int>(g), &config.grasps[g], k});
+    parts.grasps.push_back({{ObjectRef::cloth, k}, static_cast<int>(g), &config.grasps[g]});
   }
   gatherPins(grasps, state);
   if (config.tracking)
   {
     const TrackingConfig& tracking = *config.tracking;
-    cloth.tracked = {{config.tracking, &tracking.sets}, tracking.size, -1};
-    if (const auto* preview = std::get_if<ClothGuide>(&tracking.guide.motion))
-      cloth.tracked.leader = preview->cloth;
     parts.state.cloth_guides.resize(scene.cloths.size());
     GuideState& guide = parts.state.cloth_guides[k];
     tracking.guide.evaluate(0.0, guide.points, tracking.sets.size() > 1 ? &guide.velocity : nullptr);
@@ -108,9 +105,17 @@ ClothInputs loadsOf(const SceneConfig& scene, const ClothConfig& config)
   return inputs;
 }
 
-/// Guides feel only each other: they are where they are before what tracks them is. Throws std::invalid_argument for
-/// bodies that cloth would have to push.
-void checkContact(SceneConfig& scene, const WorldModel& model)
+}   // namespace
+
+void buildCloths(SceneConfig& scene, SceneParts& parts)
+{
+  buildEach(scene, FailurePlace::Kind::cloth, scene.cloths.size(), [&](int k) {
+    addCloth(scene, k, parts);
+    parts.inputs.cloths.push_back(loadsOf(scene, scene.cloths[k]));
+  });
+}
+
+void checkClothContact(SceneConfig& scene, const WorldModel& model)
 {
   const auto meetsOthers = [&](bool leads) {
     for (int k = 0; k < static_cast<int>(scene.cloths.size()); ++k)
@@ -137,17 +142,6 @@ void checkContact(SceneConfig& scene, const WorldModel& model)
                        "contact: false, or the cloth contact: {method: barrier}");
     }
   }
-}
-
-}   // namespace
-
-void buildCloths(SceneConfig& scene, SceneParts& parts)
-{
-  buildEach(scene, FailurePlace::Kind::cloth, scene.cloths.size(), [&](int k) {
-    addCloth(scene, k, parts);
-    parts.inputs.cloths.push_back(loadsOf(scene, scene.cloths[k]));
-  });
-  checkContact(scene, parts.model);
 }
 
 }   // namespace slender

@@ -117,7 +117,7 @@ void addGrasps(SceneConfig& scene, int r, const RodModel& model, RodState& state
     }
     state.grasps.push_back(makeGrasp(model, state, grasp.first_node, grasp.last_node, grasp.hold == Hold::frame));
     turnGrasp(grasp, state.grasps.back().X_WG, scene);
-    grasps.push_back({r, static_cast<int>(g), &grasp});
+    grasps.push_back({{ObjectRef::rod, r}, static_cast<int>(g), &grasp});
   }
 }
 
@@ -141,8 +141,6 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
   WorldModel::Rod part;
   part.model = std::make_shared<const RodModel>(std::move(built.model));
   part.contact = rod.contact;
-  if (rod.tracking)
-    part.tracked = {{rod.tracking, &rod.tracking->sets}, rod.tracking->size, -1};
   parts.model.rods.push_back(std::move(part));
   parts.state.rods.push_back(std::move(state));
 }

@@ -87,9 +87,8 @@ private:
     for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
     {
       const GraspRef& ref = simulation_.grasps()[g];
-      if (!simulation_.grasps().isActive(static_cast<int>(g)) || (place_.kind == Kind::rod     ? ref.rod
-                                                                  : place_.kind == Kind::cloth ? ref.cloth
-                                                                                               : -1) != object_)
+      const bool same_kind = place_.kind == (ref.object.isCloth() ? Kind::cloth : Kind::rod);
+      if (!simulation_.grasps().isActive(static_cast<int>(g)) || !same_kind || ref.object.index != object_)
         continue;
       const std::string name = "'" + ref.config->name + "'";
       if (place_.kind == Kind::rod)

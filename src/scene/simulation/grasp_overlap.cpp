@@ -24,7 +24,7 @@ HeldPart heldPart(const Simulation& simulation, int grasp, const GraspState& hel
 {
   HeldPart part;
   part.grasp = grasp;
-  part.rod = simulation.grasps()[static_cast<std::size_t>(grasp)].rod;
+  part.rod = simulation.grasps()[static_cast<std::size_t>(grasp)].object.index;
   part.first_node = held.first_node;
   part.last_node = held.last_node;
   const RodModel& model = simulation.rodModel(part.rod);
@@ -67,11 +67,11 @@ public:
     std::vector<HeldPart> parts;
     for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
     {
-      const GraspRef& ref = simulation_.grasps()[g];
-      if (ref.rod < 0 || !simulation_.grasps().isActive(static_cast<int>(g)))
+      const auto& [object, index, config] = simulation_.grasps()[g];
+      if (object.isCloth() || !simulation_.grasps().isActive(static_cast<int>(g)))
         continue;
-      const GraspState& held = simulation_.state().rods[ref.rod].grasps[ref.index];
-      const Pose pose = poseBetween(held.X_WG, held.velocity, inputs_.rods[ref.rod].grasps[ref.index],
+      const GraspState& held = simulation_.state().rods[object.index].grasps[index];
+      const Pose pose = poseBetween(held.X_WG, held.velocity, inputs_.rods[object.index].grasps[index],
                                     simulation_.config().time.step, fraction, nullptr);
       parts.push_back(heldPart(simulation_, static_cast<int>(g), held, pose));
     }

@@ -88,7 +88,7 @@ void LimitWatch::look(const Key& key, double value, double limit, const std::str
   Excursion& excursion = excursions_[key];
   const std::string text = subject + " " + shortNumber(value, 4) + unit + " exceeds limits." + limitName(key.first) +
                            " = " + shortNumber(limit, 4) + unit + " (t = " + shortNumber(now, 6) + " s)";
-  excursion.worst = {key.first, now, value, limit, std::move(to_release), text};
+  excursion.worst = {key.first, value, limit, std::move(to_release), text};
   act(excursion);
   if (found != excursions_.end())
     return;   // the same excursion goes on
@@ -155,10 +155,10 @@ std::vector<LimitExcess> LimitWatch::checkInputs(SceneInputs& inputs)
             ? (inputs.threads[k].nozzle.position - nozzlePose(state.threads[k]).position).norm()
             : 0.0,
         "thread", config.threads[k].name);
-  for (std::size_t k = 0; k < inputs.guides.size(); ++k)
-    see(largestMove(state.cloth_guides[k].points, inputs.guides[k]), "cloth", config.cloths[k].name);
-  for (std::size_t k = 0; k < inputs.rod_guides.size(); ++k)
-    see(largestMove(state.rod_guides[k].points, inputs.rod_guides[k]), "rod", config.rods[k].name);
+  std::size_t next = 0;
+  for (const GuideRef& guide : simulation_.guides())
+    see(largestMove(state.guide(guide.object).points, inputs.guides[next++]), guide.object.isCloth() ? "cloth" : "rod",
+        guide.name);
   if (!held_.empty())
     holdInputs(inputs);
   return begun;
@@ -177,12 +177,8 @@ void LimitWatch::holdInputs(SceneInputs& inputs) const
   for (std::size_t k = 0; k < inputs.threads.size(); ++k)
     if (simulation_.config().threads[k].nozzle)
       inputs.threads[k].nozzle = nozzlePose(state.threads[k]);
-  for (std::size_t k = 0; k < inputs.guides.size(); ++k)
-    if (inputs.guides[k].cols() > 0)
-      inputs.guides[k] = state.cloth_guides[k].points;
-  for (std::size_t k = 0; k < inputs.rod_guides.size(); ++k)
-    if (inputs.rod_guides[k].cols() > 0)
-      inputs.rod_guides[k] = state.rod_guides[k].points;
+  for (std::size_t g = 0; g < inputs.guides.size(); ++g)
+    inputs.guides[g] = state.guide(simulation_.guides()[g].object).points;
 }
 
 std::vector<LimitExcess> LimitWatch::checkStep()
@@ -221,7 +217,8 @@ void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
     const Eigen::Matrix3Xd& x = simulation_.state().rods[r].x;
     const auto stretch = [&](int j) { return (x.col((j + 1) % x.cols()) - x.col(j)).norm() / model.rest_length[j]; };
     const auto name = [&](int j) { return "rod '" + model.name + "', edge " + std::to_string(j); };
-    checkStrain({LimitKind::strain, r}, rod_strain_limits_[r], model.edges(), stretch, name, {r, -1}, begun);
+    checkStrain({LimitKind::strain, r}, rod_strain_limits_[r], model.edges(), stretch, name, {ObjectRef::rod, r},
+                begun);
   }
   for (int c = 0; c < static_cast<int>(simulation_.config().cloths.size()); ++c)
   {
@@ -232,16 +229,16 @@ void LimitWatch::checkStrains(std::vector<LimitExcess>& begun)
       const auto [a, b] = std::minmax({model.topology.edges(0, e), model.topology.edges(1, e)});
       return "cloth '" + model.name + "', between vertices " + std::to_string(a) + " and " + std::to_string(b);
     };
-    checkStrain({LimitKind::strain, rods + c}, cloth_strain_limit_, model.topology.edgeCount(), stretch, name, {-1, c},
-                begun);
+    checkStrain({LimitKind::strain, rods + c}, cloth_strain_limit_, model.topology.edgeCount(), stretch, name,
+                {ObjectRef::cloth, c}, begun);
   }
 }
 
 /// Checks the largest strain of the edges of a rod or cloth. stretch(edge) is the length of an edge over that at rest.
-/// name(edge) is for messages. `held` has the index of the rod and that of the cloth, of which one is -1.
+/// name(edge) is for messages.
 template <class Stretch, class Name>
 void LimitWatch::checkStrain(const Key& key, double limit, int edges, const Stretch& stretch, const Name& name,
-                             const std::pair<int, int>& held, std::vector<LimitExcess>& begun)
+                             const ObjectRef& object, std::vector<LimitExcess>& begun)
 {
   double strain = 0.0;
   int worst = 0;
@@ -252,12 +249,12 @@ void LimitWatch::checkStrain(const Key& key, double limit, int edges, const Stre
       worst = e;
     }
   if (!isQuiet(key, strain, limit))
-    look(key, strain, limit, name(worst) + ": its strain", "", mostLoaded(held.first, held.second), begun);
+    look(key, strain, limit, name(worst) + ": its strain", "", mostLoaded(object), begun);
 }
 
 /// Returns the active grasp with the largest force of a rod or cloth. Returns no grasp if there is none, and without
 /// `on_limit: release`.
-std::vector<int> LimitWatch::mostLoaded(int rod, int cloth) const
+std::vector<int> LimitWatch::mostLoaded(const ObjectRef& object) const
 {
   if (limits_.on_limit != OnLimit::release)
     return {};
@@ -265,9 +262,8 @@ std::vector<int> LimitWatch::mostLoaded(int rod, int cloth) const
   double largest = -1.0;
   for (std::size_t g = 0; g < simulation_.grasps().size(); ++g)
   {
-    const GraspRef& ref = simulation_.grasps()[g];
     const int grasp = static_cast<int>(g);
-    if (ref.rod != rod || ref.cloth != cloth || !simulation_.grasps().isActive(grasp))
+    if (!(simulation_.grasps()[g].object == object) || !simulation_.grasps().isActive(grasp))
       continue;
     const double force = simulation_.grasps().wrench(grasp).force.norm();
     if (force > largest)

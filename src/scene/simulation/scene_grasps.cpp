@@ -28,22 +28,21 @@ SceneGrasps::SceneGrasps(const SceneConfig& config, const WorldModel& model, Sce
 {
 }
 
-bool SceneGrasps::isActive(int grasp) const
+GraspFrame& SceneGrasps::frameOf(const GraspRef& ref) const
 {
-  const GraspRef& ref = checked(grasp);
-  return ref.cloth >= 0 ? state_.cloth_grasps[ref.cloth][ref.index].active : held(ref).active;
+  if (ref.object.isCloth())
+    return state_.cloth_grasps[ref.object.index][ref.index];
+  return state_.rods[ref.object.index].grasps[ref.index];
 }
 
-const Pose& SceneGrasps::pose(int grasp) const
-{
-  const GraspRef& ref = checked(grasp);
-  return ref.cloth >= 0 ? state_.cloth_grasps[ref.cloth][ref.index].X_WG : held(ref).X_WG;
-}
+bool SceneGrasps::isActive(int grasp) const { return frameOf(checked(grasp)).active; }
+
+const Pose& SceneGrasps::pose(int grasp) const { return frameOf(checked(grasp)).X_WG; }
 
 const std::string& SceneGrasps::heldObject(int grasp) const
 {
-  const GraspRef& ref = checked(grasp);
-  return ref.cloth >= 0 ? config_.cloths[ref.cloth].name : config_.rods[ref.rod].name;
+  const ObjectRef& object = checked(grasp).object;
+  return object.isCloth() ? config_.cloths[object.index].name : config_.rods[object.index].name;
 }
 
 const Wrench& SceneGrasps::wrench(int grasp) const
@@ -116,23 +115,20 @@ void SceneGrasps::takeTargets(const SceneInputs& inputs, WorldInputs& world)
     world.cloths[k].pins.resize(3, static_cast<Eigen::Index>(state_.cloths[k].pins.size()));
   for (int g = 0; g < static_cast<int>(refs_.size()); ++g)
   {
-    const GraspRef& ref = refs_[g];
-    if (ref.cloth < 0)
-    {
-      world.rods[ref.rod].grasps[ref.index] = drivenTarget(g, inputs);
-      continue;
-    }
-    if (!isActive(g))
+    const auto& [object, index, config] = refs_[g];
+    if (!object.isCloth())
+      world.rods[object.index].grasps[index] = drivenTarget(g, inputs);
+    if (!object.isCloth() || !isActive(g))
       continue;
     Pose& X_WG = cloth_targets_[g];
     X_WG = drivenTarget(g, inputs).X_WG;
     X_WG.orientation.normalize();
-    const std::vector<int>& pins = state_.cloths[ref.cloth].pins;
-    const ClothGrasp& grasp = state_.cloth_grasps[ref.cloth][ref.index];
+    const std::vector<int>& pins = state_.cloths[object.index].pins;
+    const ClothGrasp& grasp = state_.cloth_grasps[object.index][index];
     for (std::size_t p = 0; p < grasp.vertices.size(); ++p)
     {
       const auto pin = std::lower_bound(pins.begin(), pins.end(), grasp.vertices[p]) - pins.begin();
-      world.cloths[ref.cloth].pins.col(pin) = X_WG * grasp.points_G.col(static_cast<Eigen::Index>(p));
+      world.cloths[object.index].pins.col(pin) = X_WG * grasp.points_G.col(static_cast<Eigen::Index>(p));
     }
   }
 }
@@ -141,18 +137,15 @@ void SceneGrasps::takeWrenches(const World& world)
 {
   for (int g = 0; g < static_cast<int>(refs_.size()); ++g)
   {
-    const GraspRef& ref = refs_[g];
-    if (ref.cloth < 0)
-    {
-      state_.wrenches[g] = world.rodWrenches(ref.rod)[ref.index];
+    const auto& [object, index, config] = refs_[g];
+    if (!object.isCloth())
+      state_.wrenches[g] = world.rodWrenches(object.index)[index];
+    if (!object.isCloth() || !isActive(g))
       continue;
-    }
-    if (!isActive(g))
-      continue;
-    const ClothState& cloth = state_.cloths[ref.cloth];
-    ClothGrasp& grasp = state_.cloth_grasps[ref.cloth][ref.index];
+    const ClothState& cloth = state_.cloths[object.index];
+    ClothGrasp& grasp = state_.cloth_grasps[object.index][index];
     grasp.X_WG = cloth_targets_[g];
-    const Eigen::Matrix3Xd& forces = world.pinForces(ref.cloth);
+    const Eigen::Matrix3Xd& forces = world.pinForces(object.index);
     Wrench wrench;
     for (const int vertex : grasp.vertices)
     {
@@ -178,15 +171,14 @@ const GraspRef& SceneGrasps::checked(int grasp) const
 void SceneGrasps::attach(int grasp, int first_node, int last_node, Hold hold)
 {
   const GraspRef& ref = checked(grasp);
-  if (ref.cloth >= 0)
+  if (ref.object.isCloth())
   {
     std::vector<int> vertices(static_cast<std::size_t>(std::max(0, last_node - first_node + 1)));
     std::iota(vertices.begin(), vertices.end(), first_node);
-    attachVertices(grasp, std::move(vertices));
-    return;
+    return attachVertices(grasp, std::move(vertices));
   }
-  RodState& rod = state_.rods[ref.rod];
-  const RodModel& model = *model_.rods[ref.rod].model;
+  RodState& rod = state_.rods[ref.object.index];
+  const RodModel& model = *model_.rods[ref.object.index].model;
   const std::string nodes = "nodes " + std::to_string(first_node) + " to " + std::to_string(last_node);
   if (first_node < 0 || last_node >= model.nodes() || first_node > last_node)
   {
@@ -201,14 +193,14 @@ void SceneGrasps::attach(int grasp, int first_node, int last_node, Hold hold)
     if (static_cast<int>(other) != ref.index && held.active && first_node <= held.last_node &&
         held.first_node <= last_node)
     {
-      const auto& grasps = config_.rods[ref.rod].grasps;
+      const auto& grasps = config_.rods[ref.object.index].grasps;
       throw std::invalid_argument("grasp " + ref.config->name + ": " + nodes + " overlap " +
                                   (other < grasps.size() ? "grasp " + grasps[other].name : std::string("a weld")) +
                                   ", which holds " + std::to_string(held.first_node) + " to " +
                                   std::to_string(held.last_node));
     }
   }
-  checkHeld(ref.rod, ref.index, first_node, last_node);
+  checkHeld(ref.object.index, ref.index, first_node, last_node);
   rod.forgetHistory();   // the integrator's past was that of another set of constraints
   rod.grasps[ref.index] = makeGrasp(model, rod, first_node, last_node, hold == Hold::frame);
   takeOffset(grasp, state_.time);
@@ -217,13 +209,13 @@ void SceneGrasps::attach(int grasp, int first_node, int last_node, Hold hold)
 void SceneGrasps::attachVertices(int grasp, std::vector<int> vertices)
 {
   const GraspRef& ref = checked(grasp);
-  if (ref.cloth < 0)
+  if (!ref.object.isCloth())
     throw std::invalid_argument("grasp " + ref.config->name + " holds a rod, which has nodes");
   std::sort(vertices.begin(), vertices.end());
   vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  ClothState& cloth = state_.cloths[ref.cloth];
-  std::vector<ClothGrasp>& grasps = state_.cloth_grasps[ref.cloth];
-  checkVertices(vertices, config_.cloths[ref.cloth], cloth, grasps, static_cast<std::size_t>(ref.index));
+  ClothState& cloth = state_.cloths[ref.object.index];
+  std::vector<ClothGrasp>& grasps = state_.cloth_grasps[ref.object.index];
+  checkVertices(vertices, config_.cloths[ref.object.index], cloth, grasps, static_cast<std::size_t>(ref.index));
   grasps[ref.index] = clothGraspOf(cloth, std::move(vertices));
   gatherPins(grasps, cloth);
   takeOffset(grasp, state_.time);
@@ -232,17 +224,11 @@ void SceneGrasps::attachVertices(int grasp, std::vector<int> vertices)
 void SceneGrasps::release(int grasp)
 {
   const GraspRef& ref = checked(grasp);
-  if (ref.cloth >= 0)
-  {
-    std::vector<ClothGrasp>& grasps = state_.cloth_grasps[ref.cloth];
-    grasps[ref.index].active = false;
-    gatherPins(grasps, state_.cloths[ref.cloth]);
-  }
+  frameOf(ref).active = false;
+  if (ref.object.isCloth())
+    gatherPins(state_.cloth_grasps[ref.object.index], state_.cloths[ref.object.index]);
   else
-  {
-    held(ref).active = false;
-    state_.rods[ref.rod].forgetHistory();
-  }
+    state_.rods[ref.object.index].forgetHistory();
   state_.wrenches[grasp] = {};
 }
 

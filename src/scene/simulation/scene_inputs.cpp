@@ -30,49 +30,23 @@ void addThreads(const SceneConfig& config, const SceneState& state, double time,
   }
 }
 
-void addGuides(const SceneConfig& config, const SceneState& state, double time, SceneInputs& inputs)
+void addGuides(const std::vector<GuideRef>& guides, const SceneState& state, double time, SceneInputs& inputs)
 {
-  const auto add = [time](const auto& objects, const std::vector<GuideState>& guides,
-                          std::vector<Eigen::Matrix3Xd>& points) {
-    points.resize(guides.size());
-    for (std::size_t k = 0; k < guides.size(); ++k)
-    {
-      const auto& tracking = objects[k].tracking;
-      if (tracking && !tracking->guide.byTopic() && !std::holds_alternative<ClothGuide>(tracking->guide.motion))
-        tracking->guide.evaluate(time, points[k]);
-      else
-        points[k] = guides[k].points;
-    }
-  };
-  add(config.cloths, state.cloth_guides, inputs.guides);
-  add(config.rods, state.rod_guides, inputs.rod_guides);
-}
-
-/// `name`: of the list of inputs; `parts`, `points`: what the entries are for, and what they consist of.
-template <class Configs>
-void checkGuides(const std::vector<Eigen::Matrix3Xd>& given, const std::vector<GuideState>& guides,
-                 const Configs& configs, const std::string& name, const std::string& part, const std::string& points)
-{
-  if (given.size() != guides.size())
+  inputs.guides.resize(guides.size());
+  for (std::size_t g = 0; g < guides.size(); ++g)
   {
-    throw std::invalid_argument("inputs." + name + " has " + std::to_string(given.size()) + " entries; must have " +
-                                std::to_string(guides.size()) + ", one per " + part +
-                                " of a scene where any tracks a guide");
-  }
-  for (std::size_t k = 0; k < given.size(); ++k)
-  {
-    if (given[k].cols() != guides[k].points.cols())
-    {
-      throw std::invalid_argument("inputs." + name + " of " + configs[k].name + " has " +
-                                  std::to_string(given[k].cols()) + " " + points + "; must have " +
-                                  std::to_string(guides[k].points.cols()));
-    }
+    const GuideConfig& guide = guides[g].tracking->guide;
+    if (guide.byTopic() || std::holds_alternative<ClothGuide>(guide.motion))
+      inputs.guides[g] = state.guide(guides[g].object).points;
+    else
+      guide.evaluate(time, inputs.guides[g]);
   }
 }
 
 }   // namespace
 
-void sceneInputsAt(const SceneConfig& config, const SceneState& state, double time, SceneInputs& inputs)
+void sceneInputsAt(const SceneConfig& config, const std::vector<GuideRef>& guides, const SceneState& state, double time,
+                   SceneInputs& inputs)
 {
   inputs.wind = config.wind;
   const auto given = [time](const GivenMotion& motion, const Pose& now) {
@@ -88,10 +62,11 @@ void sceneInputsAt(const SceneConfig& config, const SceneState& state, double ti
   for (std::size_t k = 0; k < config.obstacles.size(); ++k)
     inputs.obstacles.push_back(given(config.obstacles[k].motion, state.obstacles[k]));
   addThreads(config, state, time, inputs);
-  addGuides(config, state, time, inputs);
+  addGuides(guides, state, time, inputs);
 }
 
-void checkSceneInputs(const SceneConfig& config, const SceneState& state, std::size_t grasps, const SceneInputs& inputs)
+void checkSceneInputs(const SceneConfig& config, const std::vector<GuideRef>& guides, const SceneState& state,
+                      std::size_t grasps, const SceneInputs& inputs)
 {
   const auto check = [](const char* name, std::size_t given, std::size_t expected, const char* of) {
     if (given != expected)
@@ -103,8 +78,13 @@ void checkSceneInputs(const SceneConfig& config, const SceneState& state, std::s
   check("bodies", inputs.bodies.size(), config.bodies.size(), "body");
   check("threads", inputs.threads.size(), config.threads.size(), "thread");
   check("obstacles", inputs.obstacles.size(), config.obstacles.size(), "obstacle");
-  checkGuides(inputs.guides, state.cloth_guides, config.cloths, "guides", "cloth", "vertices");
-  checkGuides(inputs.rod_guides, state.rod_guides, config.rods, "rod_guides", "rod", "nodes");
+  check("guides", inputs.guides.size(), guides.size(), "tracked object");
+  for (std::size_t g = 0; g < guides.size(); ++g)
+    if (const auto given = inputs.guides[g].cols(), expected = state.guide(guides[g].object).points.cols();
+        given != expected)
+      throw std::invalid_argument("inputs.guides of " + guides[g].name + " has " + std::to_string(given) +
+                                  (guides[g].object.isCloth() ? " vertices" : " nodes") + "; must have " +
+                                  std::to_string(expected));
 }
 
 void takeSceneInputs(const SceneConfig& config, const SceneState& initial, const SceneInputs& inputs,
@@ -112,8 +92,7 @@ void takeSceneInputs(const SceneConfig& config, const SceneState& initial, const
 {
   world.bodies = inputs.bodies;
   world.obstacles = inputs.obstacles;
-  world.cloth_guides = inputs.guides;
-  world.rod_guides = inputs.rod_guides;
+  world.guides = inputs.guides;
   for (RodInputs& rod : world.rods)
     rod.wind = inputs.wind;
   for (ClothInputs& cloth : world.cloths)

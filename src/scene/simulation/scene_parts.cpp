@@ -2,6 +2,26 @@
 
 namespace slender {
 
+namespace {
+
+/// Lets tracked objects of a kind follow their guides.
+template <class Configs, class Models>
+void addGuides(ObjectRef::Kind kind, const Configs& configs, Models& models, std::vector<GuideRef>& guides)
+{
+  for (std::size_t k = 0; k < configs.size(); ++k)
+  {
+    const auto& tracking = configs[k].tracking;
+    if (!tracking)
+      continue;
+    const auto* leader = std::get_if<ClothGuide>(&tracking->guide.motion);
+    models[k].tracked = {
+        {tracking, &tracking->sets}, tracking->size, leader ? leader->cloth : -1, static_cast<int>(guides.size())};
+    guides.push_back({{kind, static_cast<int>(k)}, configs[k].name, tracking.get()});
+  }
+}
+
+}   // namespace
+
 SceneParts buildParts(SceneConfig& scene)
 {
   SceneParts parts;
@@ -12,6 +32,9 @@ SceneParts buildParts(SceneConfig& scene)
   buildRods(scene, parts);
   buildThreads(scene, parts);
   buildCloths(scene, parts);
+  addGuides(ObjectRef::cloth, scene.cloths, parts.model.cloths, parts.guides);
+  addGuides(ObjectRef::rod, scene.rods, parts.model.rods, parts.guides);
+  checkClothContact(scene, parts.model);
   buildBodies(scene, parts);
   ignoreHeldContacts(scene, parts);
   parts.state.grasp_offsets.resize(parts.grasps.size());

@@ -16,6 +16,7 @@ struct SceneParts
   WorldModel model;
   SceneState state;               ///< without the grasps of welds, which the world adds
   std::vector<GraspRef> grasps;   ///< over all rods, then all cloths; point into the configuration
+  std::vector<GuideRef> guides;   ///< over all tracked cloths, then all tracked rods; point into the configuration
   WorldInputs inputs;             ///< gravity and the loads of rods and cloths, which act all the time
 };
 
@@ -26,6 +27,9 @@ SceneParts buildParts(SceneConfig& scene);
 void buildRods(SceneConfig& scene, SceneParts& parts);
 void buildThreads(const SceneConfig& scene, SceneParts& parts);
 void buildCloths(SceneConfig& scene, SceneParts& parts);
+/// Warns of guides that touch nothing but each other, because they are stepped ahead of what tracks them. Throws
+/// SceneError for bodies that cloth would have to push. Call it after the cloths got their guides.
+void checkClothContact(SceneConfig& scene, const WorldModel& model);
 /// Bodies and obstacles.
 void buildBodies(const SceneConfig& scene, SceneParts& parts);
 

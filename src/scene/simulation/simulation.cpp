@@ -47,6 +47,7 @@ Simulation::Simulation(SceneConfig config, bool solve_start) : config_(std::move
   SceneParts parts = buildParts(config_);
   state_ = std::move(parts.state);
   world_inputs_ = std::move(parts.inputs);
+  guides_ = std::move(parts.guides);
   world_ = buildWorld(config_, std::move(parts.model), state_);
   weld_poses_ = weldPoses(config_, world_->model(), state_);
   grasps_.reset(new SceneGrasps(config_, world_->model(), state_, std::move(parts.grasps)));
@@ -72,6 +73,7 @@ Simulation::Simulation(SceneConfig config, const Simulation& running) : config_(
   transfer.checkTables(running.state_.time);
   transfer.takeWelds(running.weld_poses_, parts.model);
   world_inputs_ = std::move(parts.inputs);
+  guides_ = std::move(parts.guides);
 
   // Build the state for reset(). If this fails, only reset() is not possible; see reset_problem_.
   initial_ = parts.state;
@@ -126,7 +128,7 @@ ClothEnergies Simulation::clothEnergies(int cloth) const
 
 void Simulation::inputsAt(double time, SceneInputs& inputs) const
 {
-  sceneInputsAt(config_, state_, time, inputs);
+  sceneInputsAt(config_, guides_, state_, time, inputs);
   grasps_->inputsAt(time, inputs);
 }
 
@@ -144,7 +146,7 @@ SceneInputs Simulation::defaultInputs() const
 
 void Simulation::takeInputs(const SceneInputs& inputs)
 {
-  checkSceneInputs(config_, state_, grasps_->size(), inputs);
+  checkSceneInputs(config_, guides_, state_, grasps_->size(), inputs);
   takeSceneInputs(config_, initial_, inputs, world_inputs_);
   grasps_->takeTargets(inputs, world_inputs_);
 }

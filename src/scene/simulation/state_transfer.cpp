@@ -67,17 +67,16 @@ StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before,
     welds_before_(weldsOf(from)),
     welds_now_(weldsOf(to))
 {
-  rods_ = sameNames(from.rods, to.rods);
+  objects_[ObjectRef::rod] = sameNames(from.rods, to.rods);
   threads_ = sameNames(from.threads, to.threads);
-  cloths_ = sameNames(from.cloths, to.cloths);
-  bodies_ = sameNames(from.bodies, to.bodies);
-  obstacles_ = sameNames(from.obstacles, to.obstacles);
+  objects_[ObjectRef::cloth] = sameNames(from.cloths, to.cloths);
+  objects_[ObjectRef::body] = sameNames(from.bodies, to.bodies);
+  objects_[ObjectRef::obstacle] = sameNames(from.obstacles, to.obstacles);
   for (const GraspRef& grasp : now_)
   {
     grasps_.push_back(indexWhere(before_, [&](const GraspRef& other) {
-      const bool held = grasp.cloth >= 0 ? other.cloth >= 0 && other.cloth == cloths_[grasp.cloth]
-                                         : other.cloth < 0 && other.rod == rods_[grasp.rod];
-      return held && other.config->name == grasp.config->name;
+      const ObjectRef holder{grasp.object.kind, indexBefore(grasp.object)};
+      return other.object == holder && other.config->name == grasp.config->name;
     }));
   }
   for (const BodyWeld& weld : welds_now_)
@@ -86,9 +85,9 @@ StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before,
     }));
 }
 
-bool StateTransfer::ownerStays(const GraspRef& grasp) const
+int StateTransfer::indexBefore(const ObjectRef& object) const
 {
-  return !isNew(grasp.cloth >= 0 ? cloths_[grasp.cloth] : rods_[grasp.rod]);
+  return objects_[object.kind][static_cast<std::size_t>(object.index)];
 }
 
 void StateTransfer::checkTables(double time) const
@@ -115,7 +114,7 @@ void StateTransfer::checkTables(double time) const
     if (isNew(threads_[k]) && to_.threads[k].nozzle)
       check(to_.threads[k].nozzle->motion, "the nozzle of thread " + to_.threads[k].name);
   for (const GraspRef& grasp : now_)
-    if (!ownerStays(grasp))
+    if (isNew(indexBefore(grasp.object)))
       check(grasp.config->motion, "grasp " + grasp.config->name);
 }
 
@@ -145,19 +144,19 @@ void StateTransfer::takeGrasps(const SceneState& before, SceneState& state) cons
 {
   for (std::size_t g = 0; g < now_.size(); ++g)
   {
-    const GraspRef& ref = now_[g];
-    if (!ownerStays(ref))
+    const auto& [object, index, config] = now_[g];
+    if (isNew(indexBefore(object)))
       continue;
-    const GraspRef* old = isNew(grasps_[g]) ? nullptr : &before_[static_cast<std::size_t>(grasps_[g])];
-    const auto grasp_of = [](auto& of, const GraspRef& r) { return &of.rods[r.rod].grasps[r.index]; };
-    const auto cloth_grasp_of = [](auto& of, const GraspRef& r) { return &of.cloth_grasps[r.cloth][r.index]; };
-    const auto take = [&](const auto& find) {
-      if (old)
-        *find(state, ref) = *find(before, *old);
+    const auto take = [&, grasp = index](auto& to, const auto& from) {
+      if (isNew(grasps_[g]))
+        to[grasp].active = false;
       else
-        find(state, ref)->active = false;
+        to[grasp] = from[before_[static_cast<std::size_t>(grasps_[g])].index];
     };
-    ref.cloth >= 0 ? take(cloth_grasp_of) : take(grasp_of);
+    if (object.isCloth())
+      take(state.cloth_grasps[object.index], before.cloth_grasps[indexBefore(object)]);
+    else
+      take(state.rods[object.index].grasps, before.rods[indexBefore(object)].grasps);
   }
   takeEntries(grasps_, before.grasp_offsets, state.grasp_offsets);
   takeEntries(grasps_, before.wrenches, state.wrenches);
@@ -168,10 +167,10 @@ bool StateTransfer::isHeldAsBefore(int rod) const
 {
   std::vector<int> grasps_before, grasps_now, welds_before, welds_now;
   for (int g = 0; g < static_cast<int>(before_.size()); ++g)
-    if (before_[g].cloth < 0 && before_[g].rod == rods_[rod])
+    if (before_[g].object == ObjectRef{ObjectRef::rod, rods_[rod]})
       grasps_before.push_back(g);
   for (std::size_t g = 0; g < now_.size(); ++g)
-    if (now_[g].cloth < 0 && now_[g].rod == rod)
+    if (now_[g].object == ObjectRef{ObjectRef::rod, rod})
       grasps_now.push_back(grasps_[g]);
   for (int w = 0; w < static_cast<int>(welds_before_.size()); ++w)
     if (welds_before_[w].rod == rods_[rod])
@@ -219,18 +218,9 @@ void StateTransfer::takeContacts(const std::vector<int>& same, const std::vector
 {
   if (from.empty() || to.empty())
     return;
-  const auto mapOf = [this](const ContactPartner& partner) -> const std::vector<int>& {
-    switch (partner.kind)
-    {
-      case ContactPartner::rod: return rods_;
-      case ContactPartner::cloth: return cloths_;
-      case ContactPartner::body: return bodies_;
-      default: return obstacles_;
-    }
-  };
   // Gives a partner its number in the edited world. Returns false if it is gone.
-  const auto renumber = [&](ContactPartner& partner) {
-    const std::vector<int>& map = mapOf(partner);
+  const auto renumber = [&](ObjectRef& partner) {
+    const std::vector<int>& map = objects_[partner.kind];
     const auto at = std::find(map.begin(), map.end(), partner.index);
     partner.index = static_cast<int>(at - map.begin());
     return at != map.end();
@@ -248,7 +238,7 @@ void StateTransfer::takeContacts(const std::vector<int>& same, const std::vector
     keep(to[k].springs);
     keep(to[k].ranges);
     for (const ContactRange& range : found)
-      if (isNew(mapOf(range.partner)[static_cast<std::size_t>(range.partner.index)]))
+      if (isNew(indexBefore(range.partner)))
         to[k].ranges.push_back(range);
   }
 }
@@ -290,7 +280,7 @@ void StateTransfer::attachNew(SceneGrasps& grasps, double time) const
                    hasNew(to_.obstacles, obstacles_, body->body)))   // before, no body of the scene had this name
         grasps.takeOffset(g, time);
     }
-    else if (!ownerStays(now_[g]))
+    else if (isNew(indexBefore(now_[g].object)))
     {
       if (config.attach == Attach::initial)
         grasps.takeOffset(g, time);
@@ -299,7 +289,7 @@ void StateTransfer::attachNew(SceneGrasps& grasps, double time) const
     {
       try
       {
-        if (now_[g].cloth >= 0)
+        if (now_[g].object.isCloth())
           grasps.attachVertices(g, config.vertices);
         else
           grasps.attach(g, config.first_node, config.last_node, config.hold);

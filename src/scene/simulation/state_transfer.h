@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,8 @@ public:
   void attachNew(SceneGrasps& grasps, double time) const;
 
 private:
-  bool ownerStays(const GraspRef& grasp) const;
+  /// Returns the index that an object had before the edit; -1: it is new.
+  int indexBefore(const ObjectRef& object) const;
   bool isHeldAsBefore(int rod) const;
   void takeContacts(const std::vector<int>& same, const std::vector<ContactMemory>& from,
                     std::vector<ContactMemory>& to) const;
@@ -56,7 +58,10 @@ private:
   const std::vector<GraspRef> before_, now_;
   const std::vector<BodyWeld> welds_before_, welds_now_;
   // per object, grasp or weld of the edited scene: its index in the scene before the edit; -1: it is new
-  std::vector<int> rods_, threads_, cloths_, bodies_, obstacles_, grasps_, welds_;
+  std::array<std::vector<int>, 4> objects_;   ///< by ObjectRef::Kind
+  const std::vector<int>&rods_ = objects_[ObjectRef::rod], &cloths_ = objects_[ObjectRef::cloth],
+        &bodies_ = objects_[ObjectRef::body], &obstacles_ = objects_[ObjectRef::obstacle];
+  std::vector<int> threads_, grasps_, welds_;
 };
 
 }   // namespace slender

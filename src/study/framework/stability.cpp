@@ -228,7 +228,7 @@ Run run(const MapScene& scene, double step, int steps, const Run* along = nullpt
   if (tracking)
   {
     guide = tracking->guide.mesh.vertices;
-    averages = simulation->functions(0).constraints->averages(guide);
+    averages = simulation->functions({ObjectRef::cloth, 0}).constraints->averages(guide);
   }
   // What there is to give: the fall through its own size, and what the guide puts in.
   double work = 0, scale = start.mass * simulation->config().gravity.norm() * r.path->size + 1e-12;
@@ -250,7 +250,8 @@ Run run(const MapScene& scene, double step, int steps, const Run* along = nullpt
     r.path->x.push_back(positions(state));
     if (tracking)
     {
-      const Matrix3Xd reached = simulation->functions(0).constraints->averages(state.cloth_guides[0].points);
+      const Matrix3Xd reached =
+          simulation->functions({ObjectRef::cloth, 0}).constraints->averages(state.cloth_guides[0].points);
       const double given = (reached - averages).cwiseProduct(state.cloth_guides[0].forces).sum();
       averages = reached;
       work += given;

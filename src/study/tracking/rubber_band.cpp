@@ -121,7 +121,7 @@ BandRun followedGuide(const Band& band, bool averages, BandMotion motion, double
     set.constraints = band.segments;
     model.rods[0].tracked.sets = std::make_shared<const std::vector<FunctionSet>>(1, set);
     world_state.rod_guides.resize(1);
-    world_inputs.rod_guides.resize(1);
+    world_inputs.guides.resize(1);
   }
   else
     for (int r = 0; r < kAnchors; ++r)
@@ -146,14 +146,14 @@ BandRun followedGuide(const Band& band, bool averages, BandMotion motion, double
     for (int r = 0; r < static_cast<int>(inputs.grasps.size()); ++r)
       inputs.grasps[r].X_WG.position = guide.col(r * per_segment);
     if (averages)
-      world_inputs.rod_guides[0] = guide;
+      world_inputs.guides[0] = guide;
     const double begin = threadSeconds();
     const StepReport report = world.step(world_state, world_inputs);
     seconds += threadSeconds() - begin;
     if (!report.ok)
       throw std::runtime_error(report.message);
     if (averages)
-      result.error = std::max(result.error, world.rodTrackingError(0, world_state));
+      result.error = std::max(result.error, world.trackingError({ObjectRef::rod, 0}, world_state).met);
     if (k == settle)
       result.still = state.x;
     if (k == settle + pulse)

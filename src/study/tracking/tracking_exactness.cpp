@@ -111,7 +111,7 @@ Result followExactly(StudyContext& context, const Scene& scene, int steps)
   inputs.cloths.resize(1);
   inputs.cloths[0].gravity = c.gravity;
   inputs.cloths[0].wind = c.wind;
-  inputs.cloth_guides.resize(1);
+  inputs.guides.resize(1);
   World world(model, state);
   const Eigen::Matrix3Xd& rest = c.guide.vertices;
   const double size = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).norm();
@@ -119,12 +119,12 @@ Result followExactly(StudyContext& context, const Scene& scene, int steps)
   for (int k = 1; k <= steps; ++k)
   {
     context.progress(k, steps, scene.what);
-    inputs.cloth_guides[0] = c.motion(k * kExactStep);
+    inputs.guides[0] = c.motion(k * kExactStep);
     const StepReport report = world.step(state, inputs);
     if (!report.ok)
       throw std::runtime_error("tracking_exactness: " + scene.what + ", step " + std::to_string(k) + ": " +
                                report.message);
-    const Eigen::Matrix3Xd averages = c.constraints->averages(inputs.cloth_guides[0]);
+    const Eigen::Matrix3Xd averages = c.constraints->averages(inputs.guides[0]);
     result.worst = std::max(result.worst, c.constraints->error(averages, state.cloths[0].x) / size);
     result.force = std::max(result.force, state.cloth_guides[0].forces.colwise().norm().maxCoeff());
     result.contacts += report.repulsions + report.impulses;

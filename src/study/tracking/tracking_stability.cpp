@@ -170,7 +170,7 @@ Verdict runGuided(Simulation& simulation, const GuideCase& guide, int steps, dou
     {
       const Matrix3Xd& x = now.x;
       const double reach = x.cwiseAbs().maxCoeff(), size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).norm();
-      v.worst = std::max(v.worst, simulation.trackingError(0).met / (size + 1e-3 * reach + 0.4));
+      v.worst = std::max(v.worst, simulation.trackingError({ObjectRef::cloth, 0}).met / (size + 1e-3 * reach + 0.4));
       // Once the guide is still, nothing puts energy in; what is strained then is what there is to give.
       if (guide.comes_to_rest && !guide.to_be_refused && k == steps * 3 / 4)
       {
