@@ -43,71 +43,71 @@ GuideInputs::GuideInputs(ros::NodeHandle nh, const NodeOptions& options, const S
   buffer_options.catch_up_speed = options.catch_up_speed;
   buffer_options.catch_up_turning = 3.0 * options.catch_up_speed;   // [rad/s]: as if a hand's radius of 1/3 m turned
 
-  const bool topics = addGrasps(nh, simulation, buffer_options, names.grasps);
-  addSolids(simulation, buffer_options);
-  const bool threads = addThreads(nh, simulation, buffer_options, names.nozzles);
-  const bool bodies =
-      std::any_of(guided_.begin(), guided_.end(), [](const Guided& guided) { return !guided.body.empty(); });
-  if (topics)
+  addGrasps(nh, buffer_options, names.grasps);
+  addSolids(nh, buffer_options);
+  addThreads(nh, buffer_options, names.nozzles);
+  const auto any = [](const auto& things, const auto& fits) { return std::any_of(things.begin(), things.end(), fits); };
+  if (any(guided_, [](const Guided& guided) { return guided.kind == Kind::grasp && guided.byMessages(); }))
     subscribers_.push_back(subscribe<geometry_msgs::PoseArray>(
         nh, "guides", kQueueSize, [this](const geometry_msgs::PoseArray& message) { onGuides(message); }));
-  if (bodies)
+  if (any(guided_, [](const Guided& guided) { return !guided.body.empty(); }))
     subscribers_.push_back(subscribe<slender_sim::BodyStates>(
         nh, "bodies", kQueueSize, [this](const slender_sim::BodyStates& message) { onBodies(message); }));
   wind_topic_ = simulation.config().wind_topic;
   if (wind_topic_)
     subscribers_.push_back(subscribe<geometry_msgs::Vector3Stamped>(
         nh, "wind", kQueueSize, [this](const geometry_msgs::Vector3Stamped& message) { onWind(message); }));
-  tracking_ = std::make_unique<TrackingInputs>(nh, options_, buffer_options, simulation, clock_, tf_buffer_, drops_);
+  addGuides(nh, buffer_options);
   tf_ = std::make_unique<TfInputs>(options_, clock_, tf_buffer_, drops_, std::move(own_frames));
   followFrames();
-  if (!tf_listener_ && (topics || bodies || threads || wind_topic_ || tracking_->any() || tf_->any()))
+  if (!tf_listener_ && (any(guided_, [](const Guided& guided) { return guided.buffer != nullptr; }) || wind_topic_ ||
+                        any(threads_, [](const Driven& thread) { return thread.belt_topic; }) || !guides_.empty()))
     tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_, true, ros::TransportHints().tcpNoDelay());
   if (before)
     takeOver(*before);
 }
 
-/// Returns true if at least one grasp listens to a topic of its own.
-bool GuideInputs::addGrasps(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
+/// `X_HG` is as in GuideBuffer.
+template <class AnyMotion>
+void GuideInputs::addGuided(ros::NodeHandle& nh, const GuideBuffer::Options& options, Guided guided,
+                            const AnyMotion& motion, Attach attach, const Pose& X_WG, const std::optional<Pose>& X_HG)
+{
+  if (const auto* tf = std::get_if<TfMotion>(&motion))
+    guided.frame = tf->frame;
+  if (comesFromOutside(motion) || !guided.body.empty())
+    guided.buffer = std::make_unique<GuideBuffer>(options, attach, X_WG, X_HG);
+  if (guided.byMessages())
+  {
+    const int number = static_cast<int>(guided_.size());
+    subscribers_.push_back(subscribe<geometry_msgs::PoseStamped>(
+        nh, guided.topic, kQueueSize,
+        [this, number](const geometry_msgs::PoseStamped& message) { onPose(number, message); }));
+  }
+  guided_.push_back(std::move(guided));
+}
+
+void GuideInputs::addGrasps(ros::NodeHandle& nh, const GuideBuffer::Options& options,
                             const std::vector<std::string>& names)
 {
-  bool topics = false;
-  const std::set<std::string> solids = solidNames(simulation.config());
-  for (std::size_t g = 0; g < simulation.grasps().size(); ++g)
+  const std::set<std::string> solids = solidNames(simulation_->config());
+  const SceneGrasps& grasps = simulation_->grasps();
+  for (int g = 0; g < static_cast<int>(grasps.size()); ++g)
   {
-    const GraspConfig& config = *simulation.grasps()[g].config;
-    Guided guided;
-    guided.name = names[g];
-    guided.topic = "grasps/" + guided.name + "/pose";
+    const GraspConfig& config = *grasps[g].config;
+    Guided guided{Kind::grasp, g, "grasps/" + grasps.heldObject(g) + "/" + names[g], names[g],
+                  "grasps/" + names[g] + "/pose"};
     const auto* body = std::get_if<BodyMotion>(&config.motion);
     if (body && !solids.count(body->body))
       guided.body = body->body;
-    if (const auto* tf = std::get_if<TfMotion>(&config.motion))
-      guided.frame = tf->frame;
-    const bool topic = std::holds_alternative<TopicMotion>(config.motion);
-    if (topic || !guided.body.empty() || !guided.frame.empty())
-      guided.buffer = std::make_unique<GuideBuffer>(
-          options, config.attach, simulation.grasps().pose(static_cast<int>(g)), offsetInFrame(config));
-    guided_.push_back(std::move(guided));
-    if (topic)
-    {
-      topics = true;
-      subscribePose(nh);
-    }
+    addGuided(nh, options, std::move(guided), config.motion, config.attach, grasps.pose(g), offsetInFrame(config));
   }
-  grasps_ = guided_.size();
-  return topics;
 }
 
 /// Returns the kind and name of the object for messages, for example "grasp left".
 std::string GuideInputs::kindOf(std::size_t guided) const
 {
-  const std::size_t solid = guided - grasps_;
-  const char* kind = guided < grasps_               ? "grasp "
-                     : solid < bodies_              ? "body "
-                     : solid < bodies_ + obstacles_ ? "obstacle "
-                                                    : "";
-  return kind + guided_[guided].name;
+  static const char* const kinds[] = {"grasp ", "body ", "obstacle ", ""};
+  return kinds[static_cast<int>(guided_[guided].kind)] + guided_[guided].name;
 }
 
 void GuideInputs::followFrames()
@@ -116,7 +116,26 @@ void GuideInputs::followFrames()
     if (!guided_[g].frame.empty())
       tf_->follow(guided_[g].frame, kindOf(g),
                   [this, g](double time, const Pose& X_WF) { return takePose(g, time, X_WF); });
-  tracking_->followFrames(*tf_);
+  for (int g = 0; g < static_cast<int>(guides_.size()); ++g)
+    if (guides_[g].by_tf)
+      tf_->follow(guides_[g].carried->bodies.front(), guides_[g].topic,
+                  [this, g](double time, const Pose& X_WF) { return takeBody(g, 0, time, X_WF); });
+}
+
+/// Calls visit(buffer) for all buffers.
+template <class Visit>
+void GuideInputs::forBuffers(const Visit& visit)
+{
+  for (Guided& guided : guided_)
+    if (guided.buffer)
+      visit(*guided.buffer);
+  for (Guide& guide : guides_)
+  {
+    if (guide.points)
+      visit(*guide.points);
+    for (GuideBuffer& body : guide.bodies)
+      visit(body);
+  }
 }
 
 /// Gives all inputs the same lag, so that links of a robot, the grasp in its gripper and objects that messages move are
@@ -126,54 +145,31 @@ void GuideInputs::shareLag()
 {
   if (!tf_->any())
     return;
-  double lag = tracking_->wantedLag();
-  for (const Guided& guided : guided_)
-    if (guided.buffer && guided.buffer->lastTime() &&
-        clock_.seconds() - *guided.buffer->lastTime() <= options_.guide_timeout)
-      lag = std::max(lag, guided.buffer->timing().wantedLag());
-  for (Guided& guided : guided_)
-    if (guided.buffer)
-      guided.buffer->lagAtLeast(lag);
-  tracking_->lagAtLeast(lag);
+  double lag = 0.0;
+  forBuffers([&](const auto& buffer) {
+    if (buffer.lastTime() && clock_.seconds() - *buffer.lastTime() <= options_.guide_timeout)
+      lag = std::max(lag, buffer.timing().wantedLag());
+  });
+  forBuffers([lag](auto& buffer) { buffer.lagAtLeast(lag); });
 }
 
-/// Poses of the last of guided_, on its topic.
-void GuideInputs::subscribePose(ros::NodeHandle& nh)
-{
-  const int guided = static_cast<int>(guided_.size()) - 1;
-  subscribers_.push_back(subscribe<geometry_msgs::PoseStamped>(
-      nh, guided_.back().topic, kQueueSize,
-      [this, guided](const geometry_msgs::PoseStamped& message) { onPose(guided, message); }));
-}
-
-/// True when any of them listens to something that has a frame.
-bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
+void GuideInputs::addThreads(ros::NodeHandle& nh, const GuideBuffer::Options& options,
                              const std::vector<std::string>& prefixes)
 {
-  bool framed = false;
-  const std::vector<ThreadConfig>& threads = simulation.config().threads;
+  const std::vector<ThreadConfig>& threads = simulation_->config().threads;
   prefixes_ = prefixes;
   threads_.resize(threads.size());
   for (std::size_t k = 0; k < threads.size(); ++k)
   {
-    Guided nozzle;
-    nozzle.topic = prefixes[k] + "nozzle/pose";
-    nozzle.name = prefixes[k] + "nozzle";
-    const auto* tf = threads[k].nozzle ? std::get_if<TfMotion>(&threads[k].nozzle->motion) : nullptr;
-    const bool moved = threads[k].nozzle && std::holds_alternative<TopicMotion>(threads[k].nozzle->motion);
-    if (tf)
-      nozzle.frame = tf->frame;
-    if (moved || tf)
-      nozzle.buffer =
-          std::make_unique<GuideBuffer>(options, Attach::section, threads[k].nozzle->pose, tf ? tf->offset : Pose());
-    guided_.push_back(std::move(nozzle));
-    if (moved)
-      subscribePose(nh);
-    framed |= moved;
-    threads_[k].greatest_flow = greatestFlow(threads[k], simulation.config().time.step);
+    const NozzleConfig nozzle = threads[k].nozzle.value_or(NozzleConfig{});
+    const auto* tf = std::get_if<TfMotion>(&nozzle.motion);
+    addGuided(nh, options,
+              {Kind::nozzle, static_cast<int>(k), "threads/" + threads[k].name, prefixes[k] + "nozzle",
+               prefixes[k] + "nozzle/pose"},
+              nozzle.motion, Attach::section, nozzle.pose, tf ? tf->offset : Pose());
+    threads_[k].greatest_flow = greatestFlow(threads[k], simulation_->config().time.step);
     threads_[k].flow_topic = threads[k].nozzle && threads[k].nozzle->flow.topic;
     threads_[k].belt_topic = threads[k].floor && (threads[k].floor->belt_x.topic || threads[k].floor->belt_y.topic);
-    framed |= threads_[k].belt_topic;
     if (threads_[k].flow_topic)
       subscribers_.push_back(
           subscribe<std_msgs::Float64>(nh, prefixes[k] + "nozzle/flow", kQueueSize,
@@ -183,33 +179,25 @@ bool GuideInputs::addThreads(ros::NodeHandle& nh, const Simulation& simulation, 
           nh, prefixes[k] + "belt/velocity", kQueueSize,
           [this, k](const geometry_msgs::Vector3Stamped& message) { onBelt(k, message); }));
   }
-  return framed;
 }
 
-void GuideInputs::addSolids(const Simulation& simulation, const GuideBuffer::Options& options)
+void GuideInputs::addSolids(ros::NodeHandle& nh, const GuideBuffer::Options& options)
 {
-  const auto add = [&](const std::string& name, const GivenMotion& motion, const Pose& pose) {
-    Guided guided;
-    guided.name = name;
+  const auto add = [&](Kind kind, std::size_t index, const char* list, const std::string& name,
+                       const GivenMotion& motion, const Pose& pose) {
+    const auto* tf = std::get_if<TfMotion>(&motion);
+    Guided guided{kind, static_cast<int>(index), list + name, name, ""};
     if (std::holds_alternative<TopicMotion>(motion))
-    {
       guided.body = name;
-      guided.buffer = std::make_unique<GuideBuffer>(options, Attach::section, pose);
-    }
-    if (const auto* tf = std::get_if<TfMotion>(&motion))
-    {
-      guided.frame = tf->frame;
-      guided.buffer = std::make_unique<GuideBuffer>(options, Attach::section, pose, tf->offset);
-    }
-    guided_.push_back(std::move(guided));
+    addGuided(nh, options, std::move(guided), motion, Attach::section, pose, tf ? tf->offset : Pose());
   };
-  const SceneConfig& scene = simulation.config();
+  const SceneConfig& scene = simulation_->config();
   for (std::size_t b = 0; b < scene.bodies.size(); ++b)
-    add(scene.bodies[b].name, scene.bodies[b].motion.value_or(FixedMotion{}), simulation.state().bodies[b].X_WB);
-  bodies_ = scene.bodies.size();
+    add(Kind::body, b, "bodies/", scene.bodies[b].name, scene.bodies[b].motion.value_or(FixedMotion{}),
+        simulation_->state().bodies[b].X_WB);
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k)
-    add(scene.obstacles[k].name, scene.obstacles[k].motion, simulation.state().obstacles[k]);
-  obstacles_ = scene.obstacles.size();
+    add(Kind::obstacle, k, "obstacles/", scene.obstacles[k].name, scene.obstacles[k].motion,
+        simulation_->state().obstacles[k]);
 }
 
 void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
@@ -223,15 +211,13 @@ void GuideInputs::onPose(int guided, const geometry_msgs::PoseStamped& message)
 void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
 {
   drops_.receive();
-  if (message.poses.size() != grasps_)
-  {
-    drops_.drop(
+  const std::size_t grasps = simulation_->grasps().size();
+  if (message.poses.size() != grasps)
+    return drops_.drop(
         Drop::wrong_length, "guides",
-        std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(grasps_) + " grasps");
-    return;
-  }
+        std::to_string(message.poses.size()) + " poses, but the scene has " + std::to_string(grasps) + " grasps");
   std::vector<Entry> entries;
-  for (std::size_t g = 0; g < grasps_; ++g)
+  for (std::size_t g = 0; g < grasps; ++g)
   {
     const std::optional<Pose> X_FH = checkedPose(message.poses[g], "guides", guided_[g].name, drops_);
     if (!X_FH)
@@ -244,96 +230,78 @@ void GuideInputs::onGuides(const geometry_msgs::PoseArray& message)
 
 void GuideInputs::onBodies(const slender_sim::BodyStates& message)
 {
-  drops_.receive();
-  if (!isComplete(message, "bodies", drops_))
-    return;
-  std::vector<Entry> entries;
-  for (std::size_t b = 0; b < message.name.size(); ++b)
-  {
-    const std::optional<Pose> X_FH = checkedPose(message.pose[b], "bodies", message.name[b], drops_);
-    if (!X_FH)
-      return;
-    if (!message.twist.empty() && !isFinite(message.twist[b]))
-    {
+  const auto refused = [&](std::size_t b) {
+    const bool bad = !message.twist.empty() && !isFinite(message.twist[b]);
+    if (bad)
       drops_.drop(Drop::not_finite, "bodies", "twist of " + message.name[b]);
-      return;
-    }
-    bool known = false;
+    return bad;
+  };
+  const auto find = [this](const std::string& name, const Pose& X_FH, std::vector<Entry>& entries) {
     for (std::size_t g = 0; g < guided_.size(); ++g)
-    {
-      if (guided_[g].body.empty() || guided_[g].body != message.name[b])   // a name may be empty, too
-        continue;
-      known = true;
-      entries.push_back({static_cast<int>(g), *X_FH});
-    }
-    if (!known)
-      drops_.drop(Drop::unknown_name, "bodies", "nothing follows \"" + message.name[b] + "\"");
-  }
-  if (!entries.empty())
-    intake_.take({{kBodiesSource, "bodies"}, entries}, message.header);
+      if (!guided_[g].body.empty() && guided_[g].body == name)   // a name may be empty, too
+        entries.push_back({static_cast<int>(g), X_FH});
+    return "nothing follows \"" + name + "\"";
+  };
+  takeBodies(message, {{kBodiesSource, "bodies"}}, refused, find);
 }
 
 Use GuideInputs::use(const Message& message, const Pose& X_WF)
 {
+  Eigen::Matrix3Xd points = message.points;
+  if (message.frame != options_.frame_id)   // an identity would round
+    for (Eigen::Index i = 0; i < points.cols(); ++i)
+      points.col(i) = X_WF * Eigen::Vector3d(points.col(i));
+  bool good = points.cols() == 0 || points.cwiseAbs().maxCoeff() <= kMaxCoordinate;
   for (const Entry& entry : message.entries)
-    if (!((X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= kMaxCoordinate))
-      return Use::out_of_range;
+    good = good && (X_WF * entry.X_FH).position.cwiseAbs().maxCoeff() <= kMaxCoordinate;
+  if (!good)
+    return Use::out_of_range;
   const double time = clock_.secondsAt(message.stamp);
-  Use use = Use::good;
+  const int guide = kFirstGuideSource - message.source;
+  bool late = points.cols() > 0 && !takePoints(guide, time, points);
   for (const Entry& entry : message.entries)
-    if (!takePose(static_cast<std::size_t>(entry.guided), time, X_WF * entry.X_FH))
-      use = Use::out_of_order;
-  return use;
+  {
+    const Pose X_WH = X_WF * entry.X_FH;
+    late |= guide >= 0 ? !takeBody(guide, entry.guided, time, X_WH)
+                       : !takePose(static_cast<std::size_t>(entry.guided), time, X_WH);
+  }
+  return late ? Use::out_of_order : Use::good;
 }
 
 bool GuideInputs::takePose(std::size_t guided, double time, const Pose& X_WH)
 {
   const bool later = guided_[guided].buffer->push(time, X_WH);
   if (later)
-    takenPose(guided, time, X_WH);
+    takenPose(slender_sim::Input::POSE, guided, guided_[guided].name, time, X_WH);
   return later;
 }
 
 void GuideInputs::processPending()
 {
-  tracking_->processPending();
   takeHand();
   intake_.processPending();
 }
 
-void GuideInputs::onPresent(const std::function<ros::Time()>& present)
-{
-  intake_.onPresent(present);
-  tracking_->onPresent(present);
-}
+void GuideInputs::onPresent(const std::function<ros::Time()>& present) { intake_.onPresent(present); }
 
 void GuideInputs::takeKept(bool all)
 {
   if (all)
     drops_.deliveredKept();
   intake_.takeKept(all);
-  tracking_->takeKept(all);
 }
 
 void GuideInputs::apply(double time, SceneInputs& inputs)
 {
   tf_->look();
   shareLag();
-  for (std::size_t g = 0; g < guided_.size(); ++g)
-    if (guided_[g].buffer)
-    {
-      const std::size_t solid = g - grasps_;
-      if (g >= grasps_ + bodies_ + obstacles_)
-      {
-        inputs.threads[solid - bodies_ - obstacles_].nozzle = guided_[g].buffer->target(time).X_WG;
-        continue;
-      }
-      GraspTarget& target = g < grasps_       ? inputs.grasps[g]
-                            : solid < bodies_ ? inputs.bodies[solid]
-                                              : inputs.obstacles[solid - bodies_];
-      target = guided_[g].buffer->target(time);
-    }
-  tracking_->apply(time, inputs);
+  std::vector<GraspTarget>* const targets[] = {&inputs.grasps, &inputs.bodies, &inputs.obstacles};
+  for (Guided& guided : guided_)
+    if (guided.buffer && guided.kind == Kind::nozzle)
+      inputs.threads[guided.index].nozzle = guided.buffer->target(time).X_WG;
+    else if (guided.buffer)
+      (*targets[static_cast<int>(guided.kind)])[guided.index] = guided.buffer->target(time);
+  applyGuides(time, inputs);
   if (wind_)
     inputs.wind = *wind_;
   for (std::size_t k = 0; k < threads_.size(); ++k)
@@ -347,14 +315,14 @@ void GuideInputs::apply(double time, SceneInputs& inputs)
 
 Pose GuideInputs::poseOf(const Simulation& simulation, std::size_t guided) const
 {
-  const std::size_t solid = guided - grasps_;
-  if (guided < grasps_)
-    return simulation.grasps().pose(static_cast<int>(guided));
-  if (solid < bodies_)
-    return simulation.state().bodies[solid].X_WB;
-  if (solid < bodies_ + obstacles_)
-    return simulation.state().obstacles[solid - bodies_];
-  return simulation.state().threads[solid - bodies_ - obstacles_].threads.front().ends[1].X_WE;
+  const int index = guided_[guided].index;
+  switch (guided_[guided].kind)
+  {
+    case Kind::grasp: return simulation.grasps().pose(index);
+    case Kind::body: return simulation.state().bodies[index].X_WB;
+    case Kind::obstacle: return simulation.state().obstacles[index];
+    default: return simulation.state().threads[index].threads.front().ends[1].X_WE;
+  }
 }
 
 void GuideInputs::attachAt(int grasp, const Pose& X_WG)
@@ -369,7 +337,7 @@ void GuideInputs::attachAll(const Simulation& simulation)
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->attachAt(poseOf(simulation, g));
-  tracking_->attachAll(simulation);
+  attachGuides(simulation);
 }
 
 void GuideInputs::catchUp(const Simulation& simulation)
@@ -377,7 +345,7 @@ void GuideInputs::catchUp(const Simulation& simulation)
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->catchUpFrom(poseOf(simulation, g));
-  tracking_->attachAll(simulation);
+  attachGuides(simulation);
 }
 
 void GuideInputs::restart(const Simulation& simulation)
@@ -391,16 +359,22 @@ void GuideInputs::restart(const Simulation& simulation)
   for (std::size_t g = 0; g < guided_.size(); ++g)
     if (guided_[g].buffer)
       guided_[g].buffer->restart(poseOf(simulation, g));
-  tracking_->restart(simulation);
+  attachGuides(simulation);
+  for (Guide& guide : guides_)
+  {
+    if (guide.points)
+      guide.points->restart(guide.held);
+    for (GuideBuffer& body : guide.bodies)
+      body.restart(Pose());
+  }
   tf_->restart();
 }
 
 void GuideInputs::skip(double seconds)
 {
-  for (Guided& guided : guided_)
-    if (guided.buffer)
-      guided.buffer->skip(seconds);
-  tracking_->skip(seconds);
+  for (Guide& guide : guides_)
+    guide.gap_start += seconds;
+  forBuffers([seconds](auto& buffer) { buffer.skip(seconds); });
 }
 
 }   // namespace slender

@@ -5,33 +5,15 @@
 
 namespace slender {
 
-/// Returns a unique key for each entry of guided_. An edit does not change the key of an object that stays.
-std::vector<std::string> GuideInputs::guidedKeys() const
-{
-  std::vector<std::string> keys;
-  const SceneConfig& scene = simulation_->config();
-  for (const GraspRef& grasp : simulation_->grasps())
-    keys.push_back("grasps/" + simulation_->grasps().heldObject(static_cast<int>(keys.size())) + "/" +
-                   grasp.config->name);
-  for (const BodyConfig& body : scene.bodies)
-    keys.push_back("bodies/" + body.name);
-  for (const ObstacleConfig& obstacle : scene.obstacles)
-    keys.push_back("obstacles/" + obstacle.name);
-  for (const ThreadConfig& thread : scene.threads)
-    keys.push_back("threads/" + thread.name);
-  return keys;
-}
-
 void GuideInputs::takeOver(GuideInputs& before)
 {
   std::map<std::string, std::size_t> places;
-  for (const std::string& key : guidedKeys())
-    places.emplace(key, places.size());
+  for (const Guided& guided : guided_)
+    places.emplace(guided.key, places.size());
   std::map<int, int> moved;   // index before the edit to index after it
-  const std::vector<std::string> keys = before.guidedKeys();
-  for (std::size_t g = 0; g < keys.size(); ++g)
+  for (std::size_t g = 0; g < before.guided_.size(); ++g)
   {
-    const auto found = places.find(keys[g]);
+    const auto found = places.find(before.guided_[g].key);
     if (found == places.end())
       continue;
     Guided &old = before.guided_[g], &now = guided_[found->second];
@@ -42,13 +24,23 @@ void GuideInputs::takeOver(GuideInputs& before)
     if (const auto hand = before.hand_.find(g); hand != before.hand_.end())
       hand_[found->second] = hand->second;
   }
-  intake_.takeOver(before.intake_, [&moved](Message& message) {
+  takeOverGuides(before, moved);
+  intake_.takeOver(before.intake_, [&](Message& message) {
+    const auto found = moved.find(message.source);
+    if (message.source <= kFirstGuideSource)
+    {
+      if (found == moved.end())
+        return false;
+      message.source = found->second;
+      message.what = guides_[kFirstGuideSource - found->second].topic;
+      return true;
+    }
+    if (found != moved.end())
+      message.source = found->second;
     std::vector<Entry> entries;
     for (const Entry& entry : message.entries)
-      if (const auto found = moved.find(entry.guided); found != moved.end())
-        entries.push_back({found->second, entry.X_FH});
-    if (const auto found = moved.find(message.source); found != moved.end())
-      message.source = found->second;
+      if (const auto guided = moved.find(entry.guided); guided != moved.end())
+        entries.push_back({guided->second, entry.X_FH});
     message.entries = std::move(entries);
     return !message.entries.empty();
   });
@@ -62,7 +54,6 @@ void GuideInputs::takeOver(GuideInputs& before)
       }
   wind_ = before.wind_;
   drops_ = before.drops_;
-  tracking_->takeOver(*before.tracking_);
 }
 
 }   // namespace slender

@@ -6,9 +6,9 @@ namespace slender {
 std::vector<std::string> GuideInputs::unheardBodies() const
 {
   std::vector<std::string> bodies;
-  for (std::size_t g = 0; g < guided_.size(); ++g)
-    if (guided_[g].buffer && !guided_[g].body.empty() && !guided_[g].buffer->lastTime())
-      bodies.push_back(guided_[g].body + (g < grasps_ ? " for grasp " + guided_[g].name : ""));
+  for (const Guided& guided : guided_)
+    if (guided.buffer && !guided.body.empty() && !guided.buffer->lastTime())
+      bodies.push_back(guided.body + (guided.kind == Kind::grasp ? " for grasp " + guided.name : ""));
   return bodies;
 }
 
@@ -24,15 +24,30 @@ std::vector<std::string> GuideInputs::unheardTopics() const
 std::vector<GuideInputs::Age> GuideInputs::ages() const
 {
   std::vector<Age> ages;
+  const auto add = [&](const std::string& name, const auto& buffer) {
+    const std::optional<double> last = buffer.lastTime();
+    const GuideTiming& timing = buffer.timing();
+    ages.push_back({name, last ? std::optional(clock_.seconds() - *last) : std::nullopt, false, timing.lag(),
+                    timing.excess(), timing.interval()});
+  };
   for (const Guided& guided : guided_)
   {
     if (!guided.buffer)
       continue;
     const std::string name = guided.name + (guided.frame.empty() ? "" : " (tf " + guided.frame + ")");
-    ages.push_back(TrackingInputs::ageOf(name, *guided.buffer, clock_.seconds()));
+    add(name, *guided.buffer);
   }
-  for (const Age& age : tracking_->ages())
-    ages.push_back(age);
+  for (const Guide& guide : guides_)
+  {
+    if (guide.points)
+      add(guide.topic, *guide.points);
+    for (std::size_t b = 0; b < guide.bodies.size(); ++b)   // one may fall silent while others speak
+    {
+      const std::string& body = guide.carried->bodies[b];
+      add(guide.topic + (guide.by_tf ? " (tf " + body + ")" : " " + body), guide.bodies[b]);
+      ages.back().missing = !ages.back().seconds && guide.heard();
+    }
+  }
   return ages;
 }
 

@@ -50,13 +50,13 @@ bool GuideInputs::isDraggable(std::size_t guided) const
 {
   const Guided& g = guided_[guided];
   // A grasp on a body moves with the body, and an object that follows tf moves with a robot.
-  return g.buffer && g.frame.empty() && (guided >= grasps_ || g.body.empty());
+  return g.buffer && g.frame.empty() && (g.kind != Kind::grasp || g.body.empty());
 }
 
 std::string GuideInputs::handleName(std::size_t guided) const
 {
   const Guided& g = guided_[guided];
-  return guided < grasps_ ? "grasps/" + g.name : guided < grasps_ + bodies_ + obstacles_ ? "bodies/" + g.name : g.name;
+  return g.kind == Kind::grasp ? "grasps/" + g.name : g.kind == Kind::nozzle ? g.name : "bodies/" + g.name;
 }
 
 std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
@@ -65,23 +65,23 @@ std::vector<Handle> GuideInputs::handles(const Simulation& simulation) const
   const SceneConfig& scene = simulation.config();
   for (std::size_t g = 0; g < guided_.size(); ++g)
   {
-    if (!isDraggable(g) || (g < grasps_ && !simulation.grasps().isActive(static_cast<int>(g))))
+    const auto [kind, index] = std::pair(guided_[g].kind, guided_[g].index);
+    if (!isDraggable(g) || (kind == Kind::grasp && !simulation.grasps().isActive(index)))
       continue;
     Handle handle{handleName(g), poseOf(simulation, g)};
-    if (g < grasps_)
-      sizeGraspHandle(simulation, simulation.grasps()[g], handle);
-    else if (g < grasps_ + bodies_ + obstacles_)
+    if (kind == Kind::grasp)
+      sizeGraspHandle(simulation, simulation.grasps()[index], handle);
+    else if (kind != Kind::nozzle)
     {
-      const std::size_t solid = g - grasps_;
-      const Shape* shape = solid >= bodies_            ? &scene.obstacles[solid - bodies_].shape
-                           : scene.bodies[solid].shape ? &*scene.bodies[solid].shape
+      const Shape* shape = kind == Kind::obstacle      ? &scene.obstacles[index].shape
+                           : scene.bodies[index].shape ? &*scene.bodies[index].shape
                                                        : nullptr;
       handle.size = shape ? 2.4 * reachOf(*shape) : 0.15 * diagonal(sceneBox(simulation.state()));
       handle.ball = 0.35 * handle.size;
     }
     else
     {
-      const double diameter = scene.threads[g - grasps_ - bodies_ - obstacles_].nozzle->diameter;
+      const double diameter = scene.threads[index].nozzle->diameter;
       handle.size = 8.0 * diameter;
       handle.ball = 1.8 * diameter;
     }
@@ -125,7 +125,7 @@ void GuideInputs::takeHand()
     // the first pose of all is where the thing is: there the hand took hold of it
     const Pose X_FG = last ? moved->second.X_FH : poseOf(*simulation_, g);
     const Entry entry{static_cast<int>(g), X_FG * guided_[g].buffer->graspInGripper().inverse()};
-    const bool solid = g >= grasps_ && g < grasps_ + bodies_ + obstacles_;
+    const bool solid = guided_[g].kind == Kind::body || guided_[g].kind == Kind::obstacle;
     intake_.take({{solid ? kBodiesSource : static_cast<int>(g), handleName(g)}, {entry}}, header);
     moved = last ? hand_.erase(moved) : std::next(moved);
   }

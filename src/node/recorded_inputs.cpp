@@ -34,11 +34,7 @@ Eigen::Vector3d vectorOf(const Input& input)
 
 }   // namespace
 
-void GuideInputs::onTaken(InputSink sink)
-{
-  sink_ = std::move(sink);
-  tracking_->onTaken([this](Input input) { taken(std::move(input)); });
-}
+void GuideInputs::onTaken(InputSink sink) { sink_ = std::move(sink); }
 
 void GuideInputs::taken(Input input) const
 {
@@ -46,11 +42,13 @@ void GuideInputs::taken(Input input) const
     sink_(std::move(input));
 }
 
-void GuideInputs::takenPose(std::size_t guided, double time, const Pose& X_WH) const
+void GuideInputs::takenPose(std::uint8_t kind, std::size_t index, const std::string& name, double time,
+                            const Pose& X_WH, int part) const
 {
   if (!sink_)
     return;
-  Input input = inputOf(Input::POSE, guided, guided_[guided].name);
+  Input input = inputOf(kind, index, name);
+  input.part = part;
   input.time = time;
   input.pose = toMessage(X_WH);
   sink_(std::move(input));
@@ -68,7 +66,6 @@ void GuideInputs::stopListening()
   subscribers_.clear();
   tf_listener_.reset();
   tf_->stop();
-  tracking_->stopListening();
 }
 
 void GuideInputs::repeat(const Input& input)
@@ -90,14 +87,14 @@ void GuideInputs::repeat(const Input& input)
     case Input::BELT: checked(threads_, input.index, "thread").belt = vectorOf(input); return;
     case Input::WIND: wind_ = vectorOf(input); return;
     case Input::GUIDE_POINTS:
-    case Input::GUIDE_BODY: tracking_->repeat(input); return;
+    case Input::GUIDE_BODY: return repeatGuide(input);
     default:
       throw std::runtime_error("its input " + std::to_string(input.number) +
                                " is of an unknown kind; replay it with the version that recorded it");
   }
 }
 
-void TrackingInputs::takenPoints(int guide, double time, const Eigen::Matrix3Xd& points) const
+void GuideInputs::takenPoints(int guide, double time, const Eigen::Matrix3Xd& points) const
 {
   if (!sink_)
     return;
@@ -108,18 +105,7 @@ void TrackingInputs::takenPoints(int guide, double time, const Eigen::Matrix3Xd&
   sink_(std::move(input));
 }
 
-void TrackingInputs::takenBody(int guide, int body, double time, const Pose& pose) const
-{
-  if (!sink_)
-    return;
-  Input input = inputOf(Input::GUIDE_BODY, static_cast<std::size_t>(guide), guides_[guide].carried->bodies[body]);
-  input.part = body;
-  input.time = time;
-  input.pose = toMessage(pose);
-  sink_(std::move(input));
-}
-
-void TrackingInputs::repeat(const Input& input)
+void GuideInputs::repeatGuide(const Input& input)
 {
   Guide& guide = checked(guides_, input.index, "guide");
   bool good = false;

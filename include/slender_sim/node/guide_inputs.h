@@ -12,6 +12,7 @@
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/Vector3Stamped.h>
 #include <ros/node_handle.h>
+#include <sensor_msgs/PointCloud2.h>
 #include <std_msgs/Float64.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
@@ -25,20 +26,21 @@
 #include "slender_sim/node/input_replay.h"
 #include "slender_sim/node/message_intake.h"
 #include "slender_sim/node/node_options.h"
+#include "slender_sim/node/point_guide_buffer.h"
 #include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/node/tf_inputs.h"
-#include "slender_sim/node/tracking_inputs.h"
 #include "slender_sim/scene/simulation.h"
 
 namespace slender {
 
-/// Receives all inputs from outside that move grasps, nozzles, driven bodies and obstacles. Poses arrive on the topics
-/// `grasps/NAME/pose`, `guides`, `bodies` and `nozzle/pose`; tf2 transforms them into the node's frame. TfInputs
-/// follows frames of tf, and TrackingInputs receives the guides of tracked objects. Messages on `nozzle/flow`,
-/// `belt/velocity` and `wind` are valid from the next step on. The class subscribes only to the topics that the scene
-/// asks for. Bad messages are dropped and counted; the object then keeps its previous input. Stamp zero means the
-/// present time.
+/// Receives all inputs from outside that move grasps, nozzles, driven bodies, obstacles and the guides of tracked
+/// objects. Poses arrive on the topics `grasps/NAME/pose`, `guides`, `bodies` and `nozzle/pose`. Guides arrive on
+/// `guide/points` (their vertices or nodes in order) or `guide/bodies` (of the bodies that carry them); in scenes of
+/// several tracked objects on `tracked/NAME/guide/points` and so on. A message is taken or dropped as a whole; tf2
+/// transforms it into the node's frame. TfInputs follows frames of tf. Messages on `nozzle/flow`, `belt/velocity` and
+/// `wind` are valid from the next step on. The class subscribes only to the topics that the scene asks for. Bad
+/// messages are dropped and counted; the object then keeps its previous input. Stamp zero means the present time.
 class GuideInputs
 {
 public:
@@ -88,9 +90,22 @@ public:
   std::vector<Handle> handles(const Simulation& simulation) const;
 
   const DropCounter& drops() const { return drops_; }
-  bool waiting() const { return intake_.waiting() || !hand_.empty() || tracking_->waiting(); }
+  bool waiting() const { return intake_.waiting() || !hand_.empty(); }
 
-  using Age = TrackingInputs::Age;
+  /// State of the messages of a grasp, body, obstacle or nozzle, of a guide by points, or of one body of a guide.
+  /// `seconds`: age of the last pose; nothing if none came. `missing`: no pose of this body came, but poses of other
+  /// bodies of the same guide came. `lag`: lag of the input [s]. `excess`: largest recent excess of the lag over
+  /// ~guide_delay [s]. `interval`: time between messages [s].
+  struct Age
+  {
+    std::string name;
+    std::optional<double> seconds;
+    bool missing;
+    double lag, excess, interval;
+    /// Returns by how much the transport of messages took longer than ~guide_delay [s]. Sparse messages that arrive at
+    /// once are not late.
+    double late() const { return excess - 2.0 * interval; }
+  };
   /// Returns "NAME for grasp G" for each body that an object follows by the topic `bodies`, as long as no message has
   /// named this body.
   std::vector<std::string> unheardBodies() const;
@@ -112,24 +127,53 @@ public:
 private:
   // recorded_inputs.cpp
   void taken(slender_sim::Input input) const;
-  void takenPose(std::size_t guided, double time, const Pose& X_WH) const;
+  void takenPose(std::uint8_t kind, std::size_t index, const std::string& name, double time, const Pose& X_WH,
+                 int part = 0) const;
+  void takenPoints(int guide, double time, const Eigen::Matrix3Xd& points) const;
+  void repeatGuide(const slender_sim::Input& input);
   void takenValues(std::uint8_t kind, std::size_t thread, const std::vector<double>& values) const;
 
-  // buffer: nullptr if not driven from outside; frame: tf frame that is followed, empty if driven by messages
+  enum class Kind
+  {
+    grasp,
+    body,
+    obstacle,
+    nozzle
+  };
+  // `index` counts those of its kind. An edit does not change the `key` of an object that stays. `body` is an entry of
+  // the topic `bodies`. `frame` is the tf frame that is followed, empty if driven by messages. `buffer` is nullptr if
+  // not driven from outside.
   struct Guided
   {
-    std::string name, body, topic, frame;
-    std::unique_ptr<GuideBuffer> buffer;
+    Kind kind;
+    int index;
+    std::string key, name, topic, body{}, frame{};
+    std::unique_ptr<GuideBuffer> buffer{};
     bool byMessages() const { return buffer && body.empty() && frame.empty(); }
+  };
+  struct Guide   // of a tracked object
+  {
+    std::size_t index = 0;   // in Simulation::guides()
+    bool by_tf = false;
+    std::string topic;
+    std::unique_ptr<PointGuideBuffer> points;   // by points
+    const CarriedGuide* carried = nullptr;      // by bodies, one buffer each:
+    std::vector<GuideBuffer> bodies;
+    std::vector<Pose> poses;
+    bool catches_up = true;       // from `held` at the next apply()
+    Eigen::Matrix3Xd held, gap;   // by bodies: where it was, and what of the way is left
+    double gap_start = 0.0, gap_duration = 0.0;
+    bool heard() const;   // from any body
   };
   struct Entry
   {
-    int guided;
+    int guided;   // of the bodies that carry a guide, if the message is for a guide
     Pose X_FH;
   };   // a gripper, body or obstacle in the frame of the message
   struct Message : FramedMessage
   {
-    std::vector<Entry> entries;
+    std::vector<Entry> entries{};
+    Eigen::Matrix3Xd points{};   // of a guide, in the frame of the message
   };
 
   void onPose(int guided, const geometry_msgs::PoseStamped& message);
@@ -145,28 +189,63 @@ private:
   void onGuides(const geometry_msgs::PoseArray& message);
   void onBodies(const slender_sim::BodyStates& message);
   Pose poseOf(const Simulation& simulation, std::size_t guided) const;
-  bool addThreads(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
-                  const std::vector<std::string>& prefixes);
-  void subscribePose(ros::NodeHandle& nh);
-  bool addGrasps(ros::NodeHandle& nh, const Simulation& simulation, const GuideBuffer::Options& options,
-                 const std::vector<std::string>& names);
-  void addSolids(const Simulation& simulation, const GuideBuffer::Options& options);
+  template <class AnyMotion>
+  void addGuided(ros::NodeHandle& nh, const GuideBuffer::Options& options, Guided guided, const AnyMotion& motion,
+                 Attach attach, const Pose& X_WG, const std::optional<Pose>& X_HG);
+  void addThreads(ros::NodeHandle& nh, const GuideBuffer::Options& options, const std::vector<std::string>& prefixes);
+  void addGrasps(ros::NodeHandle& nh, const GuideBuffer::Options& options, const std::vector<std::string>& names);
+  void addSolids(ros::NodeHandle& nh, const GuideBuffer::Options& options);
+  /// Takes the poses of bodies in. refused(number) reports a body with which the message cannot be used. find(name,
+  /// pose, entries) adds the entries for a body, and returns the report for one without.
+  template <class Refused, class Find>
+  void takeBodies(const slender_sim::BodyStates& message, Message taken, const Refused& refused, const Find& find)
+  {
+    drops_.receive();
+    if (!isComplete(message, taken.what, drops_))
+      return;
+    for (std::size_t b = 0; b < message.name.size(); ++b)
+    {
+      const std::optional<Pose> X_FH = checkedPose(message.pose[b], taken.what, message.name[b], drops_);
+      if (!X_FH || refused(b))
+        return;
+      const std::size_t before = taken.entries.size();
+      const std::string unknown = find(message.name[b], *X_FH, taken.entries);
+      if (taken.entries.size() == before)
+        drops_.drop(Drop::unknown_name, taken.what, unknown);
+    }
+    if (!taken.entries.empty())
+      intake_.take(std::move(taken), message.header);
+  }
   void followFrames();
   void shareLag();
   std::string kindOf(std::size_t guided) const;
-  std::vector<std::string> guidedKeys() const;
   void takeOver(GuideInputs& before);
+  // guide_inputs_tracked.cpp
+  const GuideRef& refOf(const Guide& guide) const;
+  void addGuides(ros::NodeHandle& nh, const GuideBuffer::Options& options);
+  void takeOverGuides(GuideInputs& before, std::map<int, int>& moved);
+  void onGuidePoints(int guide, const sensor_msgs::PointCloud2& message);
+  void onGuideBodies(int guide, const slender_sim::BodyStates& message);
+  void applyGuides(double time, SceneInputs& inputs);
+  void placeBodies(Guide& guide, double time, Eigen::Matrix3Xd& vertices) const;
+  void attachGuides(const Simulation& simulation);
   Use use(const Message& message, const Pose& X_WF);
-  /// Returns false when the pose is not later than the last one.
+  // These return false when the pose or the points are not later than the last ones.
   bool takePose(std::size_t guided, double time, const Pose& X_WH);
+  bool takeBody(int guide, int body, double time, const Pose& X_WH);
+  bool takePoints(int guide, double time, const Eigen::Matrix3Xd& points);
+  template <class Visit>
+  void forBuffers(const Visit& visit);
 
-  static constexpr int kGuidesSource = -1, kBodiesSource = -2;
+  // Sources of messages that are not for one of guided_.
+  static constexpr int kGuidesSource = -1, kBodiesSource = -2, kFirstGuideSource = -3;
+  static int sourceOfGuide(std::size_t guide) { return kFirstGuideSource - static_cast<int>(guide); }
 
   const NodeOptions options_;
   const Simulation* simulation_;
   const SimClock& clock_;
-  std::vector<Guided> guided_;                            // grasps in scene order, then bodies, obstacles, nozzles
-  std::size_t grasps_ = 0, bodies_ = 0, obstacles_ = 0;   // how many of the first three
+  std::vector<Guided> guided_;   // grasps in scene order, then bodies, obstacles, nozzles
+  std::vector<Guide> guides_;
   struct Driven
   {
     bool flow_topic = false, belt_topic = false;
@@ -190,7 +269,6 @@ private:
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   MessageIntake<Message> intake_;
   std::unique_ptr<TfInputs> tf_;
-  std::unique_ptr<TrackingInputs> tracking_;
   std::vector<ros::Subscriber> subscribers_;
   InputSink sink_;
 };
