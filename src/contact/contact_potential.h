@@ -85,7 +85,7 @@ public:
   /// of a contact's force over the largest force.
   double lagFriction() { return lagFriction(0.0, false); }
   /// A point of each contact whose friction the last lagFriction(), or the last evaluate(), changed by more than
-  /// kLagTolerance.
+  /// kLagTolerance of the largest force on one of its objects.
   const std::vector<int>& pointsOfChanges() const { return points_of_changes_; }
   /// A change that lagFriction() returns is negligible if it is at most this [-].
   static constexpr double kLagTolerance = 1e-2;
@@ -217,6 +217,9 @@ private:
   double lagFriction(double least, bool predicted);
   void keepHistory(Contact& contact, const Contact& old, bool predicted) const;
   void findSpring(Contact& contact) const;
+  double findLargestForces();
+  bool isNoticeable(const Contact& contact, double change) const;
+  void addChange(const Contact& contact, double change);
   void relax(double change);
   void check(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids) const;
   /// How the points of an object have moved since begin() [m].
@@ -378,7 +381,8 @@ private:
   /// The change that lagFriction() without prediction returned last, and the share of the change of each force that
   /// the next call takes over.
   double last_change_ = kInfinity, relaxation_ = 1.0;
-  std::vector<std::pair<int, double>> changes_;   ///< points of contacts, and by how much forces change [N]
+  std::vector<double> largest_forces_;   ///< for lagFriction(): the largest normal forces that rub on each object [N]
+  double largest_change_ = 0.0;          ///< of such a force by lagFriction() [N]
   std::vector<int> points_of_changes_;
   std::vector<double> rubbed_;   ///< energies of friction, for addTerms() [J]
   double shift_ = 0.0;           ///< constant of the potential, see followFriction() [J]

@@ -184,17 +184,13 @@ double ContactPotential::addTerms(const Place& place, const Eigen::VectorXd* tur
 /// forces it takes the predicted ones of the same contacts, each of them if it has changed.
 double ContactPotential::lagFriction(double least, bool predicted)
 {
-  double largest = 0.0;
-  for (const auto* list : {&lagged_, &found_.contacts})
-    for (const Contact& contact : *list)
-      largest = std::max(largest, frictionOf(contact) > 0.0 ? contact.force.norm() : 0.0);
+  const double largest = findLargestForces();
   auto old = lagged_.begin();
   auto before = predicted_.begin();
   rubbing_.clear();
-  changes_.clear();
   const auto isOld = [&](const Contact& contact) {
     for (; old != lagged_.end() && comesBefore(*old, contact); ++old)
-      changes_.emplace_back(old->point[0], old->force.norm());
+      addChange(*old, old->force.norm());
     return old != lagged_.end() && !comesBefore(contact, *old);
   };
   for (const Contact& present : found_.contacts)
@@ -213,35 +209,62 @@ double ContactPotential::lagFriction(double least, bool predicted)
       contact.force = before->size * present.force.normalized();
     const bool same = isOld(present);
     const double change = same ? (contact.force - old->force).norm() : contact.force.norm();
-    if (predicted && same && (before->far || change <= kLagTolerance * largest))
+    if (predicted && same && (before->far || !isNoticeable(contact, change)))
     {
       rubbing_.push_back(*old++);
       continue;
     }
     if (predicted && before->far)
       continue;
-    changes_.emplace_back(contact.point[0], change);
+    addChange(contact, change);
     same ? keepHistory(contact, *old++, predicted) : findSpring(contact);
     if (!same || !predicted)
       setLevers(contact);
     rubbing_.push_back(contact);
   }
   for (; old != lagged_.end(); ++old)
-    changes_.emplace_back(old->point[0], old->force.norm());
-  double share = 0.0;
-  points_of_changes_.clear();
-  for (const auto& [point, change] : changes_)
-  {
-    share = std::max(share, largest > 0.0 ? change / largest : 0.0);
-    if (change > kLagTolerance * largest)
-      points_of_changes_.push_back(point);
-  }
+    addChange(*old, old->force.norm());
+  const double share = largest > 0.0 ? largest_change_ / largest : 0.0;
   shift_ = 0.0;
   if (!predicted)
     relax(share);
   if (share >= least)
     lagged_.swap(rubbing_);
+  else
+    points_of_changes_.clear();
   return share;
+}
+
+/// Finds the largest normal force that rubs on each object, now or as friction has it. Returns the largest of all.
+double ContactPotential::findLargestForces()
+{
+  double largest = 0.0;
+  largest_change_ = 0.0;
+  points_of_changes_.clear();
+  largest_forces_.assign(surface_.objects.size(), 0.0);
+  for (const auto* list : {&lagged_, &found_.contacts})
+    for (const Contact& contact : *list)
+      for (const int object : {contact.object, contact.other})
+        if (object >= 0 && frictionOf(contact) > 0.0)
+        {
+          largest_forces_[object] = std::max(largest_forces_[object], contact.force.norm());
+          largest = std::max(largest, largest_forces_[object]);
+        }
+  return largest;
+}
+
+/// Returns whether a change of a contact's normal force counts beside the forces on the objects that touch.
+bool ContactPotential::isNoticeable(const Contact& contact, double change) const
+{
+  const double of_other = contact.other >= 0 ? largest_forces_[contact.other] : 0.0;
+  return change > kLagTolerance * std::max(largest_forces_[contact.object], of_other);
+}
+
+void ContactPotential::addChange(const Contact& contact, double change)
+{
+  largest_change_ = std::max(largest_change_, change);
+  if (isNoticeable(contact, change))
+    points_of_changes_.push_back(contact.point[0]);
 }
 
 /// A contact that had friction before, `old`, keeps its history. `predicted`: see lagFriction().

@@ -34,7 +34,7 @@ constexpr double kFineGap = 1e-3;   ///< of the smallest gap: motion at contacts
 /// - pushes(): whether something that is driven moves;
 /// - advance(to): puts what is held or driven, in the trial, where it is at `to`, and moves along what is pushed;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
-/// - lagFriction() and stiffen(converged): as those of ContactPotential;
+/// - lagFriction() and stiffen(converged): those of ContactPotential, after which what has changed is solved again;
 /// - contact(): the ContactPotential.
 template <class System>
 NewtonResult minimizeConfined(System& system, double from, double to, const NewtonConfig& newton, double gap)

@@ -134,9 +134,11 @@ void Equations::settle()
 {
   if (moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced))
   {
+    // Sweeps and averages solve for all coupled parts together.
+    const bool together = matrix_.solver() == SharedMatrix::Solver::sweeps || anyAverages();
     group_moves_.assign(parts_.size(), false);
     for (const Part* part : parts_)
-      if (!part->settled && !mayLeave(*part))
+      if (!part->settled && ((together && part->coupled) || !hasArrived(*part)))
         group_moves_[groups_.of(part->number)] = true;
     forParts([&](Part& part) {
       if (group_moves_[groups_.of(part.number)])
@@ -146,29 +148,15 @@ void Equations::settle()
       part.evaluate(false, {});
     });
   }
-  if (std::getenv("SLENDER_DBG"))
-  {
-    int c = 0, cs = 0, o = 0, os = 0, a = 0, as = 0;
-    for (Part* p : parts_)
-    {
-      (p->coupled ? c : p->own_terms.empty() ? a : o)++;
-      if (p->settled)
-        (p->coupled ? cs : p->own_terms.empty() ? as : os)++;
-    }
-    std::printf("SETTLE full %d newton %d coupled %d/%d own %d/%d alone %d/%d\n", moved_fully_, by_newton_, cs, c, os,
-                o, as, a);
-  }   // DBG
   for (Part* part : parts_)
     part->increment = kInfinity;
 }
 
-/// Returns whether the part may settle as soon as its group may.
-bool Equations::mayLeave(const Part& part) const
+/// Returns whether the part has converged. It settles when its group has.
+bool Equations::hasArrived(const Part& part) const
 {
-  if (part.coupled ? anyAverages() || matrix_.solver() == SharedMatrix::Solver::sweeps
-                   : !part.evaluation.inertia.positiveDefinite())
-    return false;   // Sweeps and averages solve for all coupled parts together.
-  return shares_.of(part.number) == 1.0 && part.increment <= arrived_ && part.moved_sticking <= kStick &&
+  return part.increment <= arrived_ && (part.coupled || part.evaluation.inertia.positiveDefinite()) &&
+         shares_.of(part.number) == 1.0 && part.moved_sticking <= kStick &&
          part.moved_at_contact <= kFineGap * contact_->smallestGap();
 }
 
@@ -176,7 +164,10 @@ bool Equations::mayLeave(const Part& part) const
 void Equations::wake(const std::vector<int>& points)
 {
   for (const int point : points)
+  {
     partOf(point).settled = false;
+    partOf(point).increment = kInfinity;   // The last direction does not know what has changed.
+  }
 }
 
 /// All parts of a group move as long as one of them does.
@@ -229,6 +220,7 @@ void Equations::advance(double to)
 {
   if (solidsMove())
   {
+    unsettle();
     placeSolids(to, poses_end_);
     pushing_ = true;
     const RodEvaluation trial = evaluate(true);
@@ -250,7 +242,7 @@ void Equations::advance(double to)
 
 void Equations::beginSubstep(double fraction)
 {
-  exact_ = false;
+  exact_ = pushing_ = false;
   for (std::size_t k = 0; k < parts_.size(); ++k)   // another island has numbered them differently
     parts_[k]->number = static_cast<int>(k);
   shares_.begin(static_cast<int>(parts_.size()), false);
@@ -295,11 +287,14 @@ NewtonResult Equations::solve(double from, double to, const NewtonConfig& newton
   contact_->letPass(points_base_, poses_base_, points_end_, poses_end_);
   const double gap = contact_->options().gap / tolerances.least_edge;
   arrived_ = fineTolerance(newton, gap);
-  const NewtonResult result = minimizeConfined(*this, from, to, newton, gap);
+  NewtonResult result = minimizeConfined(*this, from, to, newton, gap);
   if (std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->settled && !isAlone(*part); }))
   {
+    // The gradients of settled parts lack what others exert on them.
     unsettle();
-    evaluate(false);   // adds what others exert on them to the gradients of parts that have settled
+    evaluateParts(false, {});
+    const double scale = forceScale();
+    result.residual = scale > 0.0 ? residual() / scale : 0.0;
   }
   return result;
 }

@@ -152,7 +152,7 @@ private:
   void settle();
   void wake(const std::vector<int>& points);
   void wakeGroups();
-  bool mayLeave(const Part& part) const;
+  bool hasArrived(const Part& part) const;
   void uniteCoupled();
   void limitShares();
   void countPoints();
@@ -178,6 +178,7 @@ private:
   void addForce(const ContactTerm& term);
   void assemble(const HessianShift& shift, bool whole);
   void addTerm(const ContactTerm& term, const ContactRow* rows, int count, bool whole);
+  RodEvaluation evaluateParts(bool with_hessian, const HessianShift& shift);
   bool factor(const HessianShift& shift);
   bool anyAverages() const;
   void keepAverages();

@@ -233,6 +233,8 @@ void Equations::buildPattern()
     matrix_.noteRows(rows.data(), 3);
   }
   matrix_.finish(chooseSolver(), turns_of_triples_);
+  if (matrix_.solver() == SharedMatrix::Solver::sweeps)
+    unsettle();   // Sweeps cannot leave unknowns out.
   keys_valid_ = true;
   forAllParts([&](Part& part) {
     if (part.coupled)
@@ -324,7 +326,7 @@ bool Equations::factor(const HessianShift& shift)
 
 RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  RodEvaluation sum;
+  RodEvaluation of_surfaces;
   if (with_hessian)
     shift_ = shift;
   if (contact_)
@@ -334,19 +336,31 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
       part.gatherTurns(turns_);
       turns_.segment(part.first_point, part.points()) -= turns_begin_.segment(part.first_point, part.points());
     });
-    sum.potential = contact_->evaluate(points_, poses_, with_hessian, &turns_);
-    if (!std::isfinite(sum.potential))
-      return sum;
+    of_surfaces.potential = contact_->evaluate(points_, poses_, with_hessian, &turns_);
+    if (!std::isfinite(of_surfaces.potential))
+      return of_surfaces;
     if (pushing_)
       contact_->pushTerms(poses_, poses_end_);
     if (attraction_)
-      sum.potential += attraction_->evaluate(points_, with_hessian);
+      of_surfaces.potential += attraction_->evaluate(points_, with_hessian);
     take();
     wake(contact_->pointsOfChanges());
   }
   if (!parts_valid_ || !keys_valid_)
     buildPattern();
   wakeGroups();
+  RodEvaluation sum = evaluateParts(with_hessian, shift);
+  sum.potential += of_surfaces.potential;
+  if (with_hessian && matrix_.unknowns() > 0)
+    sum.inertia.negative += !factor(shift);
+  return sum;
+}
+
+/// Computes the energies and gradients of the parts, with the forces of the present contacts. Returns the sum of the
+/// energies without that of contact.
+RodEvaluation Equations::evaluateParts(bool with_hessian, const HessianShift& shift)
+{
+  RodEvaluation sum;
   forParts([&](Part& part) { part.evaluate(with_hessian, shift); });
   for (const Part* part : parts_)
   {
@@ -372,8 +386,6 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
   for (Part* part : parts_)
     if (part->coupled && !part->settled)
       part->closeGradient();
-  if (with_hessian && matrix_.unknowns() > 0)
-    sum.inertia.negative += !factor(shift);
   return sum;
 }
 

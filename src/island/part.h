@@ -25,7 +25,7 @@ struct PartInIsland
   bool coupled = false;           ///< the matrix of the island has its unknowns
   int offset = 0;                 ///< number of its first unknown in that matrix
   /// Newton's method has converged for the part and for all parts that contacts or joints connect to it. It is neither
-  /// evaluated nor moved until its contacts change, another part meets it, or what is prescribed moves.
+  /// evaluated nor moved until its friction changes, another part meets it, or what is prescribed moves.
   bool settled = false;
   bool has_direction = true;   ///< of the present iteration; none: it was settled when directions were computed
   double increment = 0.0;      ///< incrementSize() of the present direction

@@ -6,8 +6,8 @@
 
 namespace slender {
 
-/// Sets of the numbers 0 ... count - 1 that have no number in common. The name of a set is its least number. Memory is
-/// reused.
+/// Divides the numbers 0 ... count - 1 into sets, of which each number belongs to one (union-find). The name of a set
+/// is its least number. Memory is reused.
 class DisjointSets
 {
 public:

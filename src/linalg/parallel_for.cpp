@@ -44,7 +44,7 @@ tbb::task_arena& arenaOf(int threads)
   static const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, kMost);
   threads = std::min(threads, kMost);
   static std::mutex mutex;
-  static std::map<int, tbb::task_arena> arenas;
+  static auto& arenas = *new std::map<int, tbb::task_arena>;   // stays until the process has ended
   const std::lock_guard<std::mutex> lock(mutex);
   return arenas.try_emplace(threads, threads).first->second;
 }
@@ -62,9 +62,17 @@ int threadsOfEnvironment()
 void callParallel(int threads, int count, int chunk, void (*call)(const void* f, int k), const void* f)
 {
   static const int usual = threadsOfEnvironment();
+  if (threads <= 0)
+    threads = usual;
+  if (threads == 1)
+  {
+    for (int k = 0; k < count; ++k)
+      call(f, k);
+    return;
+  }
   Order begin, end;
   begin.signal();
-  arenaOf(threads > 0 ? threads : usual).execute([&] {
+  arenaOf(threads).execute([&] {
     const auto run = [&](const tbb::blocked_range<int>& range) {
       begin.wait();
       for (int k = range.begin(); k < range.end(); ++k)

@@ -29,7 +29,7 @@ public:
       }
       catch (...)
       {
-        errors_[k] = std::current_exception();   // must not leave the parallel region
+        errors_[k] = std::current_exception();   // is thrown after all calls
       }
     };
     parallelFor(nodes < kWorthThreads ? 1 : threads, count, 1, stepOne);

@@ -25,6 +25,7 @@ public:
   // ---- surface
   int points() const override { return 2; }
   void gather(Eigen::Matrix3Xd& all) const override { all.col(first_point) = all.col(first_point + 1) = trial_; }
+  void gatherStart(Eigen::Matrix3Xd& all) const override { all.col(first_point) = all.col(first_point + 1) = x; }
   int base(int) const override { return kPrescribed - 1; }   // both points have the same unknowns
   void addColumns(int, int component, double weight, Columns& row) const override
   {
@@ -36,7 +37,7 @@ public:
   {
     surface.segments.push_back({surface.points, surface.points + 1, radius, static_cast<int>(surface.objects.size())});
     surface.points += 2;
-    surface.objects.emplace_back();
+    surface.objects.emplace_back();   // with friction 0.3
   }
   BoundingBox surfaceBox(double ahead) const override
   {
@@ -257,6 +258,30 @@ TEST(OwnPart, AGroupSettlesWhileAnotherOneGoesOn)
   EXPECT_GT(many, few + 20);
   EXPECT_LT(beside, many - 20);
   EXPECT_LT((expected - found).cwiseAbs().maxCoeff(), 5e-3 * kIslandGap);   // A solution is resolved to 1e-3 of it.
+}
+
+/// A ball that slides over another one in a collision gets the friction of the normal force that it feels. Several
+/// solutions find the two forces, and the balls may not settle before.
+TEST(OwnPart, SlidesWithCoulombsFriction)
+{
+  for (const Vector3d& thrown : {Vector3d(2, 0, -1), Vector3d(1, 0, -0.3), Vector3d(0, 4, -4), Vector3d(0, 1, -0.2)})
+  {
+    SpringBall lower({0, 0, 0}), upper({0, 0, 0.0405});
+    upper.v = thrown;
+    for (SpringBall* ball : {&lower, &upper})
+    {
+      ball->gravity.setZero();
+      ball->stiffness = 1e-3;   // so soft that it does not count here
+    }
+    ClothIsland island(kIslandStep, kIslandGap);
+    island.others = {&lower, &upper};
+    step(island);
+    const Vector3d impulse = upper.mass * (upper.v - thrown);
+    const Vector3d normal = (upper.x - lower.x).normalized(), along = impulse - normal.dot(impulse) * normal;
+    EXPECT_GT(normal.dot(impulse), 0.1 * upper.mass * -thrown.z());
+    // Forces are resolved to a hundredth. Friction acts across the normal of the last solution but one.
+    EXPECT_NEAR(along.norm() / normal.dot(impulse), 0.3, 0.01) << thrown.transpose();
+  }
 }
 
 /// Twists a straight rod at one end, beside two balls of which one flies at the other with this speed [m/s]. Returns
