@@ -81,8 +81,9 @@ public:
   /// from the solid and its held points are not too near.
   void letPass(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, const Eigen::Matrix3Xd& x_end,
                const std::vector<Pose>& solids_end);
-  /// The normal forces and tangent planes of the last evaluate() become those of friction; returns the largest change
-  /// of a contact's force over the largest force.
+  /// The normal forces and tangent planes of the last evaluate() become those of friction, where a force has changed by
+  /// more than kLagTolerance of the largest one on the objects that touch. Returns the largest change over the largest
+  /// force of all.
   double lagFriction() { return lagFriction(0.0, false); }
   /// A point of each contact whose friction the last lagFriction(), or the last evaluate(), changed by more than
   /// kLagTolerance of the largest force on one of its objects.

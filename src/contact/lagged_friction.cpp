@@ -181,7 +181,8 @@ double ContactPotential::addTerms(const Place& place, const Eigen::VectorXd* tur
 }
 
 /// Does not take the new forces over if they have changed by less than `least`. `predicted`: instead of present normal
-/// forces it takes the predicted ones of the same contacts, each of them if it has changed.
+/// forces it takes the predicted ones of the same contacts. A contact whose force has not changed noticeably keeps its
+/// friction and where this acts, so that what has settled stays in balance.
 double ContactPotential::lagFriction(double least, bool predicted)
 {
   const double largest = findLargestForces();
@@ -209,7 +210,7 @@ double ContactPotential::lagFriction(double least, bool predicted)
       contact.force = before->size * present.force.normalized();
     const bool same = isOld(present);
     const double change = same ? (contact.force - old->force).norm() : contact.force.norm();
-    if (predicted && same && (before->far || !isNoticeable(contact, change)))
+    if (same && ((predicted && before->far) || !isNoticeable(contact, change)))
     {
       rubbing_.push_back(*old++);
       continue;
