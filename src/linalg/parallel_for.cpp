@@ -9,13 +9,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#if defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-#define SLENDER_TSAN
-#endif
-#elif defined(__SANITIZE_THREAD__)
-#define SLENDER_TSAN
-#endif
 #ifdef SLENDER_TSAN
 #include <sanitizer/tsan_interface.h>
 #endif
