@@ -211,7 +211,7 @@ private:
   {
     std::int64_t first, second;   ///< of the contact
     double size;
-    bool far;   ///< It is not known, because the contact moves too far.
+    bool far;   ///< The contact moves so far that its force is not known.
   };
 
   void beginFollowing();
@@ -382,8 +382,8 @@ private:
   /// The change that lagFriction() without prediction returned last, and the share of the change of each force that
   /// the next call takes over.
   double last_change_ = kInfinity, relaxation_ = 1.0;
-  std::vector<double> largest_forces_;   ///< for lagFriction(): the largest normal forces that rub on each object [N]
-  double largest_change_ = 0.0;          ///< of such a force by lagFriction() [N]
+  std::vector<double> largest_forces_;   ///< the largest normal force that rubs on each object [N]; for lagFriction()
+  double largest_change_ = 0.0;          ///< the largest change of such a force by lagFriction() [N]
   std::vector<int> points_of_changes_;
   std::vector<double> rubbed_;   ///< energies of friction, for addTerms() [J]
   double shift_ = 0.0;           ///< constant of the potential, see followFriction() [J]

@@ -98,7 +98,7 @@ void ContactPotential::setLevers(Contact& contact) const
   double largest = 0.0;
   for (const Vector& each : lever)
     largest = std::max(largest, each.norm());
-  contact.levers = largest > 0.0 && std::isfinite(largest);   // not finite: a segment has no length
+  contact.levers = largest > 0.0 && std::isfinite(largest);   // It is not finite if a segment has no length.
   for (Vector& each : lever)
     each = contact.levers ? Vector(kLargest / std::max(kLargest, largest) * each) : Vector::Zero();
 }

@@ -21,7 +21,8 @@ enum class Approach
 /// resolve.
 inline double fineTolerance(const NewtonConfig& newton, double gap) { return std::max(newton.tolerance, 1e-3 * gap); }
 
-constexpr double kFineGap = 1e-3;   ///< of the smallest gap: motion at contacts where a solution ends
+/// The largest motion at contacts with which a solution ends, over the smallest gap.
+constexpr double kFineGap = 1e-3;
 
 /// Minimises the energy of a system with contact whose held parts and driven solids move from the fraction `from` of a
 /// time step to `to`. They advance until contact blocks them; a solution lets the blocking parts give way; and so on.

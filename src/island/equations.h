@@ -216,7 +216,7 @@ private:
   double arrived_ = 0.0;       ///< largest increment of a part that may settle [-]
   /// Parts that contacts or joints connect, or have connected since the pattern of the matrix was begun.
   DisjointSets groups_;
-  std::vector<char> group_moves_;   ///< of the groups that have these names: a part of it is not settled
+  std::vector<char> group_moves_;   ///< whether a part of the group that has this name is not settled
   /// The last direction was computed without a shift, and parts that met nothing went all of it.
   bool by_newton_ = false, moved_fully_ = false;
   bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_

@@ -41,7 +41,8 @@ public:
   };
   static constexpr int kNone = -1;
   /// Returns all overlapping pairs, sorted. Boxes must be finite. Two boxes of the same set are no pair; `sets` has the
-  /// set of each box, or kNone. `threads` search; 0: see setThreads() of Simulation.
+  /// set of each box, or kNone. So many `threads` search. With 0 their number is the one that Simulation has by
+  /// default.
   const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, int threads = 1);
 
 private:

@@ -220,7 +220,7 @@ private:
   void shareLag();
   std::string kindOf(std::size_t guided) const;
   void takeOver(GuideInputs& before);
-  // guide_inputs_tracked.cpp
+  // These are in guide_inputs_tracked.cpp.
   const GuideRef& refOf(const Guide& guide) const;
   void addGuides(ros::NodeHandle& nh, const GuideBuffer::Options& options);
   void takeOverGuides(GuideInputs& before, std::map<int, int>& moved);

@@ -12,7 +12,7 @@ namespace slender {
 struct GraspFrame
 {
   bool active = true;
-  /// Of a rod: origin at the (middle of the) held part, x along its tangent, y along d1.
+  /// That of a rod has its origin at the held part, or at its middle, x along the tangent there, and y along d1.
   Pose X_WG;
 };
 

@@ -40,13 +40,13 @@ struct SceneInputs
   std::vector<GraspTarget> grasps;
   std::vector<GraspTarget> bodies, obstacles;   ///< per body (simulated ones: ignored) and obstacle of the scene
   std::vector<ThreadDrive> threads;             ///< per thread of the scene
-  /// per tracked object of the scene: its guide's vertices or nodes at the end of the step (3 x n [m]), ignored when
-  /// the guide is a cloth
+  /// The vertices or nodes of the guide of each tracked object at the end of the step (3 x n [m]). They are ignored if
+  /// the guide is a cloth.
   std::vector<Eigen::Matrix3Xd> guides;
   Eigen::Vector3d wind{0, 0, 0};
 };
 
-/// A grasp of the scene: of which rod or cloth, which of its grasps, and its configuration.
+/// A grasp of the scene. It says which rod or cloth has it, which of the grasps there it is, and how it is configured.
 struct GraspRef
 {
   ObjectRef object;
@@ -54,7 +54,7 @@ struct GraspRef
   const GraspConfig* config;
 };
 
-/// A guide of the scene: of which cloth or rod, the name of that, and what it follows.
+/// A guide of the scene. It says which cloth or rod has it, the name of that object, and what the guide follows.
 struct GuideRef
 {
   ObjectRef object;
