@@ -79,6 +79,7 @@ bool Statics::round(double fraction, double weight)
   const NewtonResult result = equations_->solve(fraction, fraction, newton_);
   report_.iterations += result.iterations;
   report_.factorizations += result.factorizations;
+  report_.residual = result.residual;
   failure_ = result.failure;
   if (!result.ok())
     return false;
@@ -117,10 +118,10 @@ bool Statics::carry()
 /// Minimises the energy from the present configuration on. Returns false when that does not settle.
 bool Statics::settle()
 {
-  constexpr int kMostRounds = 1000, kMostFailures = 40;
+  constexpr int kMostRounds = 1000, kMostFailures = 40, kMostLast = 5;
   constexpr double kNoWeight = 1e-9;   // below it the proximal term is left out
   double ease = 0.01;                  // smallest factor by which the weight falls from round to round
-  for (int k = 0, failures = 0; k < kMostRounds; ++k)
+  for (int k = 0, failures = 0, last = 0; k < kMostRounds; ++k)
   {
     const double weight = weight_ < kNoWeight ? 0.0 : weight_;
     if (!round(1.0, weight))
@@ -139,7 +140,8 @@ bool Statics::settle()
         return false;
       continue;
     }
-    if (weight == 0.0)
+    // Along a soft mode a last increment may be small and leave forces that are not. Another round then balances them.
+    if (weight == 0.0 && (report_.residual < kMostUnbalanced || ++last == kMostLast))
       return true;
     failures = 0;
     const double shift = largest([](const Part& part) { return part.shift(); });
