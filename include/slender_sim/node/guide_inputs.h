@@ -141,8 +141,8 @@ private:
     nozzle
   };
   // `index` counts those of its kind. An edit does not change the `key` of an object that stays. `body` is an entry of
-  // the topic `bodies`. `frame` is the tf frame that is followed, empty if driven by messages. `buffer` is nullptr if
-  // not driven from outside.
+  // the topic `bodies`. `frame` is the tf frame that is followed, and is empty for what messages drive. `buffer` is
+  // nullptr for what is not driven from outside.
   struct Guided
   {
     Kind kind;
@@ -151,29 +151,32 @@ private:
     std::unique_ptr<GuideBuffer> buffer{};
     bool byMessages() const { return buffer && body.empty() && frame.empty(); }
   };
-  struct Guide   // of a tracked object
+  // The guide of a tracked object. It comes by `points`, or by poses of the bodies that carry it. Then `bodies` has one
+  // buffer for each body, `held` is where the guide was, and `gap` is what is left of its way to where the messages
+  // have it. If `catches_up` is set, the next apply() begins this way at `held`.
+  struct Guide
   {
     std::size_t index = 0;   // in Simulation::guides()
     bool by_tf = false;
     std::string topic;
-    std::unique_ptr<PointGuideBuffer> points;   // by points
-    const CarriedGuide* carried = nullptr;      // by bodies, one buffer each:
+    std::unique_ptr<PointGuideBuffer> points;
+    const CarriedGuide* carried = nullptr;
     std::vector<GuideBuffer> bodies;
     std::vector<Pose> poses;
-    bool catches_up = true;       // from `held` at the next apply()
-    Eigen::Matrix3Xd held, gap;   // by bodies: where it was, and what of the way is left
+    bool catches_up = true;
+    Eigen::Matrix3Xd held, gap;
     double gap_start = 0.0, gap_duration = 0.0;
-    bool heard() const;   // from any body
+    bool heard() const;   // whether a pose of any body has come
   };
   struct Entry
   {
-    int guided;   // of the bodies that carry a guide, if the message is for a guide
+    int guided;   // is a number in guided_. In messages for a guide it is the number of a body that carries the guide.
     Pose X_FH;
   };   // a gripper, body or obstacle in the frame of the message
   struct Message : FramedMessage
   {
     std::vector<Entry> entries{};
-    Eigen::Matrix3Xd points{};   // of a guide, in the frame of the message
+    Eigen::Matrix3Xd points{};   // those of a guide, in the frame of the message
   };
 
   void onPose(int guided, const geometry_msgs::PoseStamped& message);
@@ -196,7 +199,7 @@ private:
   void addGrasps(ros::NodeHandle& nh, const GuideBuffer::Options& options, const std::vector<std::string>& names);
   void addSolids(ros::NodeHandle& nh, const GuideBuffer::Options& options);
   /// Takes the poses of bodies in. refused(number) reports a body with which the message cannot be used. find(name,
-  /// pose, entries) adds the entries for a body, and returns the report for one without.
+  /// pose, entries) adds the entries for a body. If there are none, it returns what to report.
   template <class Refused, class Find>
   void takeBodies(const slender_sim::BodyStates& message, Message taken, const Refused& refused, const Find& find)
   {
@@ -237,7 +240,7 @@ private:
   template <class Visit>
   void forBuffers(const Visit& visit);
 
-  // Sources of messages that are not for one of guided_.
+  // The sources of messages that are not for one entry of guided_.
   static constexpr int kGuidesSource = -1, kBodiesSource = -2, kFirstGuideSource = -3;
   static int sourceOfGuide(std::size_t guide) { return kFirstGuideSource - static_cast<int>(guide); }
 

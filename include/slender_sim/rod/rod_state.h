@@ -8,7 +8,7 @@
 
 namespace slender {
 
-/// What grasps of all kinds of objects have.
+/// The part of a grasp's state that grasps of rods and of cloths have in common.
 struct GraspFrame
 {
   bool active = true;
@@ -16,7 +16,7 @@ struct GraspFrame
   Pose X_WG;
 };
 
-/// What a grasp of one rod holds at this instant. Part of the state because grasps come and go while running.
+/// What a grasp of one rod holds at this instant. It belongs to the state because grasps come and go in a run.
 struct GraspState : GraspFrame
 {
   int first_node = 0, last_node = 0;          ///< held nodes, first <= last; equal: a single section

@@ -14,9 +14,10 @@ namespace slender {
 struct SceneParts
 {
   WorldModel model;
-  SceneState state;               ///< without the grasps of welds, which the world adds
-  std::vector<GraspRef> grasps;   ///< over all rods, then all cloths; point into the configuration
-  std::vector<GuideRef> guides;   ///< over all tracked cloths, then all tracked rods; point into the configuration
+  SceneState state;   ///< without the grasps of welds, which the world adds
+  // The entries of these two lists point into the configuration.
+  std::vector<GraspRef> grasps;   ///< of all rods, then of all cloths
+  std::vector<GuideRef> guides;   ///< of all tracked cloths, then of all tracked rods
   WorldInputs inputs;             ///< gravity and the loads of rods and cloths, which act all the time
 };
 
