@@ -25,6 +25,7 @@ public:
     double gap;
     double margin;                        ///< of triangles and solids
     const std::vector<double>& margins;   ///< of points of curves; all are `margin` where there are triangles
+    double longest;                       ///< Points that go a longer way have no margin. Below 0: no point has one.
     double turn;                          ///< [rad]
     int threads;                          ///< that search for pairs; see parallelFor()
   };
@@ -34,6 +35,11 @@ public:
   /// Without triangles each point may be anywhere in the box of its own motion, enlarged by its margin.
   void build(const ContactSurface& surface, const SheetPieces& sheets, const std::vector<SolidPieces>& solids,
              const Motion& motion, const Range& range);
+  /// Makes the candidates hold for this motion, by what build() does, but only for the points that leave their boxes
+  /// and for some whose boxes are much too large. Returns false if this would not save much time, if nothing has been
+  /// built, if solids leave their places, or if there are triangles. Then build() must be called.
+  bool follow(const ContactSurface& surface, const std::vector<SolidPieces>& solids, const Motion& motion,
+              const Range& range);
   /// Forgets everything: the surface has other pieces from now on.
   void clear()
   {
@@ -50,10 +56,26 @@ public:
 
 private:
   bool mayMeet(const ContactSurface& surface, const ContactSegment& a, const ContactSegment& b, double gap) const;
-  void findOnSolid(const ContactSurface& surface, int solid, const SolidPieces& pieces, const Motion& motion,
-                   const Range& range);
+  bool holdsAt(const Eigen::Matrix3Xd& x, Eigen::Index point) const
+  {
+    return (x.col(point).array() >= low_.col(point).array()).all() &&
+           (x.col(point).array() <= high_.col(point).array()).all();
+  }
+  bool holdsFor(const std::vector<Pose>& solids) const;
+  bool isLoose(int point, const Motion& motion, const Range& range) const;
+  void setBox(int point, const Motion& motion, const Range& range);
+  void setBox(const ContactSurface& surface, int segment, double gap);
+  void findPairs(const ContactSurface& surface, const std::vector<GridPairs::Pair>& near, double gap,
+                 std::vector<GridPairs::Pair>& found) const;
+  void findOnSolids(const ContactSurface& surface, const std::vector<SolidPieces>& solids,
+                    const std::vector<int>& segments, const Eigen::Matrix3Xd& x, double gap,
+                    std::vector<OnSolid>& found);
+  void findOnSolid(const ContactSurface& surface, const SolidPieces& pieces, OnSolid on, const Eigen::Matrix3Xd& x,
+                   double gap, std::vector<OnSolid>& found);
 
-  bool built_ = false, has_triangles_ = false;
+  std::size_t count() const { return pairs_.size() + on_solids_.size(); }
+
+  bool built_ = false, has_triangles_ = false, has_pairs_ = false;
   double margin_ = 0.0;
   Eigen::Matrix3Xd start_, way_;   ///< of points: where the motion starts, and how far it leads
   Eigen::Matrix3Xd low_, high_;    ///< boxes of points
@@ -62,8 +84,11 @@ private:
   std::vector<BoundingBox> boxes_;
   std::vector<int> sets_;   ///< of the boxes, see GridPairs
   GridPairs grid_;
-  std::vector<GridPairs::Pair> pairs_;
-  std::vector<OnSolid> on_solids_;
+  std::vector<GridPairs::Pair> pairs_, new_pairs_, spare_pairs_;
+  std::vector<OnSolid> on_solids_, new_on_solids_, spare_on_solids_;
+  std::size_t built_count_ = 0;        ///< of pairs and of pairs with solids, after build()
+  std::vector<char> left_, changed_;   ///< points that get other boxes; segments of such points
+  std::vector<int> segments_;          ///< whose pairs are sought
   std::vector<int> triangles_;
   SheetCandidates sheets_;
 };

@@ -15,7 +15,6 @@ const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
   for (const Candidates* known : {&near_, &swept_})
     if (known->holdsFor(motion.x, motion.solids) && known->holdsFor(motion.x_end, motion.solids_end))
       return *known;
-  constexpr double kLongest = 10.0;   // gaps: after longer ways, evaluations would examine too many pairs
   constexpr double kOfSheets = 0.4;   // gaps: in a wider margin, triangles find too many of their neighbours
   const auto marginOf = [&](double way) {
     return (sheets_.empty() ? std::clamp(2.0 * way / options_.gap, 1.0, 20.0) : kOfSheets) * options_.gap;
@@ -30,12 +29,15 @@ const Candidates& ContactPotential::candidatesOf(const SurfaceMotion& motion)
   for (std::size_t k = 0; k < motion.solids.size(); ++k)
     of_solids = std::max(of_solids, (motion.solids_end[k].position - motion.solids[k].position).norm());
   margin_ = marginOf(of_solids);
-  if (longest <= kLongest * options_.gap)
+  const Candidates::Range range = rangeOfCandidates();
+  if (near_.follow(surface_, solids_, motion, range))
+    return near_;
+  if (longest <= range.longest)
   {
-    near_.build(surface_, sheets_, solids_, motion, {options_.gap, margin_, margins_, kTurnMargin, threads_});
+    near_.build(surface_, sheets_, solids_, motion, range);
     return near_;
   }
-  swept_.build(surface_, sheets_, solids_, motion, {options_.gap, 0.0, no_margins_, 0.0, threads_});
+  swept_.build(surface_, sheets_, solids_, motion, rangeOfSweeps());
   return swept_;
 }
 
@@ -245,7 +247,8 @@ bool ContactPotential::fit(std::vector<Thinned>& list, const std::array<int, 3>&
 bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
 {
   letPass(x, poses, x, poses);   // what presses on held points passes, also when the pieces are new
-  near_.build(surface_, sheets_, solids_, {x, x, poses, poses}, {options_.gap, margin_, margins_, 0.0, threads_});
+  near_.build(surface_, sheets_, solids_, {x, x, poses, poses},
+              {options_.gap, margin_, margins_, kInfinity, 0.0, threads_});
   for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
     list->clear();
   for (const GridPairs::Pair& pair : near_.pairs())

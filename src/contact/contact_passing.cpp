@@ -60,8 +60,7 @@ bool ContactPotential::passedThrough(const Eigen::Matrix3Xd& x_end, const std::v
 {
   if (!movedFar(x_end, solids_end))
     return false;
-  swept_.build(surface_, sheets_, solids_, {x_begin_, x_end, solids_begin_, solids_end},
-               {options_.gap, 0.0, no_margins_, 0.0, threads_});
+  swept_.build(surface_, sheets_, solids_, {x_begin_, x_end, solids_begin_, solids_end}, rangeOfSweeps());
   ApproachLimit limit;
   // Only middle surfaces and centrelines that cross count. Surfaces that slide may come nearer than their thickness on
   // straight ways.

@@ -119,7 +119,6 @@ void ContactPotential::setPieces(const ContactSurface& pieces)
 void ContactPotential::listSegments()
 {
   margins_.assign(static_cast<std::size_t>(surface_.points), margin_);
-  no_margins_.assign(margins_.size(), 0.0);
   segment_of_point_.assign(static_cast<std::size_t>(surface_.points), -1);
   for (std::size_t k = surface_.segments.size(); k-- > 0;)
     segment_of_point_[surface_.segments[k].b] = static_cast<int>(k);
@@ -179,9 +178,9 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
   if (!x.allFinite())
     return kInfinity;
   x_now_ = x;
-  if (!near_.holdsFor(x, poses))
-    near_.build(surface_, sheets_, solids_, {x, x, poses, poses},
-                {options_.gap, margin_, margins_, kTurnMargin, threads_});
+  const SurfaceMotion standing{x, x, poses, poses};
+  if (!near_.holdsFor(x, poses) && !near_.follow(surface_, solids_, standing, rangeOfCandidates()))
+    near_.build(surface_, sheets_, solids_, standing, rangeOfCandidates());
   const Place place{x, poses, with_stiffness};
   inBatches(count(near_), [&](int first, int last, Batch& out) {
     for (int k = first; k < last && !out.meet; ++k)

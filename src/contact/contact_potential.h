@@ -350,6 +350,14 @@ private:
   double limitOf(const SurfaceMotion& motion, const Candidates::OnSolid& on) const;
   double limitOf(const SurfaceMotion& motion, const SheetCandidates::Pair& pair) const;
   double limitOf(const SurfaceMotion& motion, const SheetCandidates::OnSolid& on) const;
+  Candidates::Range rangeOfCandidates() const
+  {
+    constexpr double kLongest =
+        10.0;   // gaps: if many points went longer ways, evaluations would examine too many pairs
+    return {options_.gap, margin_, margins_, kLongest * options_.gap, kTurnMargin, threads_};
+  }
+  /// Candidates in this range hold for one motion only, because no point has a margin.
+  Candidates::Range rangeOfSweeps() const { return {options_.gap, 0.0, margins_, -1.0, 0.0, threads_}; }
   const Candidates& candidatesOf(const SurfaceMotion& motion);
   template <class Wanted, class Take>
   void forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take);
@@ -397,7 +405,7 @@ private:
   std::vector<Displacements> displacements_;   ///< per object, see movedFar()
   std::vector<int> segment_of_point_;          ///< begins at a point, or ends there if none begins; -1: none
   double margin_;                              ///< of candidates near solids and triangles [m]
-  std::vector<double> margins_, no_margins_;   ///< of candidates near points of curves [m]
+  std::vector<double> margins_;                ///< of candidates near points of curves [m]
   std::vector<int> order_;                     ///< for clearance()
   std::vector<BoundingBox> boxes_;
 };

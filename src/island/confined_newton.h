@@ -58,14 +58,15 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     }
     return r.ok();
   };
-  NewtonConfig fine = newton, loose = newton;
+  NewtonConfig fine = newton;
+  fine.balances = false;   // What has converged has settled by then, and more solutions follow where contact changes.
+  NewtonConfig loose = fine, quick = fine;
   fine.tolerance = fineTolerance(newton, gap);
   fine.max_iterations = 2 * newton.max_iterations;   // contacts that come and go cost more than a substep cut in two
   // Each advance of what pushes is an iteration as well, so that few are needed between two of them. Where many
   // advances do not arrive, as in folds, each of them goes farther after a better solution.
   loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
   loose.max_iterations = 12;
-  NewtonConfig quick = newton;
   quick.tolerance = std::max(newton.tolerance, 0.5 * gap);
   quick.max_iterations = 3;
   const double way = to - from;

@@ -101,7 +101,9 @@ public:
   double roomToTrial();
 
 private:
-  // the system of a stage, as these two need it
+  // the system of a stage, as these need it
+  template <class System>
+  friend bool isBalanced(const System&, const NewtonConfig&, NewtonResult&, int);
   template <class System>
   friend bool isLastIncrement(System&, const NewtonConfig&, const HessianShift&, double, double);
   template <class System>

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <iterator>
+
 #include <gtest/gtest.h>
 
 #include "slender_sim/contact/broad_phase.h"
@@ -42,12 +45,22 @@ TEST(BroadPhase, FindsThePairsOfBruteForceInOrder)
     for (std::size_t i = 0; i < sets.size() && k % 2 == 1; ++i)
       sets[i] = static_cast<int>(i) / 10 - 1;   // The first ten belong to none.
     const auto expected = allPairs(boxes, sets);
+    const auto expectEqual = [k](const std::vector<GridPairs::Pair>& found, const std::vector<GridPairs::Pair>& pairs) {
+      ASSERT_EQ(found.size(), pairs.size()) << k;
+      for (std::size_t i = 0; i < found.size(); ++i)
+        ASSERT_TRUE(found[i].first == pairs[i].first && found[i].second == pairs[i].second) << k;
+    };
+    std::vector<int> chosen;
+    std::vector<GridPairs::Pair> of_chosen;
+    const int every = 1 + k % 9;
+    for (int i = 0; i < n; i += every)
+      chosen.push_back(i);
+    std::copy_if(expected.begin(), expected.end(), std::back_inserter(of_chosen),
+                 [every](const GridPairs::Pair& p) { return p.first % every == 0 || p.second % every == 0; });
     for (const int threads : {1, 2})
     {
-      const auto& found = grid.find(boxes, sets, threads);
-      ASSERT_EQ(found.size(), expected.size()) << k;
-      for (std::size_t i = 0; i < found.size(); ++i)
-        ASSERT_TRUE(found[i].first == expected[i].first && found[i].second == expected[i].second) << k;
+      expectEqual(grid.find(boxes, sets, threads), expected);
+      expectEqual(grid.findWith(chosen, boxes, sets, threads), of_chosen);
     }
   }
 }
@@ -109,13 +122,17 @@ TEST(BroadPhase, CandidatesKeptFromEarlierCallsChangeNothing)
   for (int k = 0; k < 400; ++k)
   {
     const double size = k % 17 == 0 ? 0.5 : k % 7 == 0 ? 0.02 : 1e-3;
+    const bool one_curve = k % 3 != 0;   // Then candidates are sought for this curve alone.
     Eigen::Matrix3Xd end = x;
     for (Eigen::Index i = 0; i < x.size(); ++i)
-      end(i) += random.uniform(-size, size);
+      if (!one_curve || i / 36 == k % 16)
+        end(i) += random.uniform(-size, size);
     std::vector<Pose> poses_end = poses;
-    for (Pose& pose : poses_end)
-      pose = moved(pose, random.vector(size), random.vector(k % 5 == 0 ? 1.0 : 0.01));
+    if (!one_curve)
+      for (Pose& pose : poses_end)
+        pose = moved(pose, random.vector(size), random.vector(k % 5 == 0 ? 1.0 : 0.01));
     const double share = kept.stepLimit(x, end, poses, poses_end);
+    ASSERT_EQ(share, ContactPotential(surface, options).stepLimit(x, end, poses, poses_end)) << k;
     ASSERT_GT(share, 0.0) << k;
     limited += share < 1.0;
     x += share * (end - x);

@@ -1,5 +1,6 @@
 // The end of minimize(): at an error within the tolerance, and no later.
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -24,6 +25,7 @@ struct Parabola
 {
   double rate;
   bool sticks = true;   ///< what sticksAfter() returns
+  double force_scale = 1.0, most_unbalanced = 1.0;
   double x = 1.0, base = 1.0, saved = 1.0, direction = 0.0;
 
   Sums evaluate(bool, const HessianShift& = {}) const
@@ -41,9 +43,9 @@ struct Parabola
   double incrementSize() const { return std::abs(direction); }
   double slope() const { return base * direction; }
   double residual() const { return std::abs(x); }
-  double forceScale() const { return 1.0; }
+  double forceScale() const { return force_scale; }
   double noiseLevel() const { return 0.0; }
-  double mostUnbalanced() const { return 1.0; }
+  double mostUnbalanced() const { return most_unbalanced; }
   bool anglesMayKeepShift() const { return false; }
   bool sticksAfter(double) const { return sticks; }
   StepFailure givesUp() const { return StepFailure::none; }
@@ -75,6 +77,25 @@ TEST(Newton, GoesOnWhereWhatSticksWouldMove)
   const NewtonResult early = minimize(sticking, config), late = minimize(moving, config);
   ASSERT_TRUE(early.ok() && late.ok());
   EXPECT_EQ(late.iterations, early.iterations + 1);
+}
+
+/// Increments may be within the tolerance where forces are small, and what is left of the error be a large force.
+TEST(Newton, GoesOnForBalanceAndGivesItUpAfterSomeIterations)
+{
+  NewtonConfig config;
+  config.tolerance = 1e-5;
+  Parabola plain{0.01}, scaled{0.01}, without_balance{0.01};
+  scaled.force_scale = 1e-7;
+  without_balance.force_scale = 1e-30;
+  scaled.most_unbalanced = without_balance.most_unbalanced = std::numeric_limits<double>::infinity();
+  const NewtonResult before = minimize(plain, config), balanced = minimize(scaled, config);
+  ASSERT_TRUE(before.ok() && balanced.ok());
+  EXPECT_GT(before.residual, 0.05 * scaled.force_scale);
+  EXPECT_LE(balanced.residual, 0.05);
+  EXPECT_GT(balanced.iterations, before.iterations);
+  const NewtonResult tried = minimize(without_balance, config);
+  ASSERT_TRUE(tried.ok());
+  EXPECT_EQ(tried.iterations, before.iterations + 3);
 }
 
 }   // namespace

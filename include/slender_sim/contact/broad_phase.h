@@ -44,6 +44,10 @@ public:
   /// set of each box, or kNone. So many `threads` search. With 0 their number is the one that Simulation has by
   /// default.
   const std::vector<Pair>& find(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, int threads = 1);
+  /// Returns those of the pairs of find() that have a `chosen` box, or two of them. No box is chosen twice. The chosen
+  /// boxes alone fill the grid, so that few of them take a small part of the time of find().
+  const std::vector<Pair>& findWith(const std::vector<int>& chosen, const std::vector<BoundingBox>& boxes,
+                                    const std::vector<int>& sets, int threads = 1);
 
 private:
   struct Entry
@@ -51,15 +55,26 @@ private:
     std::int32_t cell[3];
     int box, set;
   };
+  using Cell = std::int32_t[3];
+  void fill(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets);
   double cellSize(const std::vector<BoundingBox>& boxes) const;
-  void fillBuckets(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, double inverse_size);
-  void search(const std::vector<BoundingBox>& boxes, double inverse_size, unsigned bucket,
-              std::vector<Pair>& found) const;
+  template <class F>
+  void forCells(const BoundingBox& box, F&& f) const;
+  bool reports(const Cell& cell, const BoundingBox& u, const BoundingBox& v) const;
+  void search(const std::vector<BoundingBox>& boxes, unsigned bucket, std::vector<Pair>& found) const;
+  void searchMembers(const std::vector<BoundingBox>& boxes, const std::vector<int>& sets, int box,
+                     std::vector<Pair>& found) const;
+  template <class F>
+  void collect(int threads, unsigned count, unsigned share, F&& f);
   void sortPairs(int boxes);
 
+  std::vector<int> members_;   ///< the boxes that fill the grid
+  std::vector<char> is_member_;
+  BoundingBox hull_;            ///< of the members, for findWith()
+  double inverse_size_ = 0.0;   ///< of cells [1/m]
   std::vector<Entry> entries_, sorted_;
   std::vector<int> bucket_start_;          ///< of each bucket in sorted_; then the number of entries
-  std::vector<std::vector<Pair>> found_;   ///< one list for each range of buckets
+  std::vector<std::vector<Pair>> found_;   ///< one list for each range of buckets, or of boxes
   std::vector<Pair> pairs_;
   std::vector<int> first_start_;
 };

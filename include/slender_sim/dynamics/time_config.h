@@ -21,6 +21,7 @@ struct NewtonConfig
   int max_iterations = 30;   ///< [1, 1000]
   int max_cuts = 10;         ///< how often a failing step is halved [0, 30]
   bool one_step = false;     ///< takes one full step of Newton's method, whose end is not in balance
+  bool balances = true;      ///< A few more iterations follow if forces are far from balance.
 };
 
 /// How the linear equations of an island of several parts are solved.
