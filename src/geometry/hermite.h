@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "slender_sim/geometry/sampled_motion.h"
+
 /// Cubic Hermite interpolation through timed samples, for poses and points alike.
 namespace slender {
 
@@ -54,7 +56,7 @@ bool pausesAt(const std::vector<double>& times, std::size_t k, bool growing, dou
 }
 
 /// Returns true if the motion goes on beyond sample k, which is the first or the last one; see
-/// PoseTrajectory::cutWithin(). Returns false for two samples, because they are a step and not a motion.
+/// SampledMotion::cutWithin(). Returns false for two samples, because they are a step and not a motion.
 inline bool isCut(const std::vector<double>& times, std::size_t k, double within)
 {
   if (times.size() < 3)
@@ -70,6 +72,35 @@ inline Eigen::Vector3d cutSlope(const Eigen::Vector3d& chord, const Eigen::Vecto
 {
   const Eigen::Vector3d parabola = 2.0 * chord - beside;
   return parabola.norm() < beside.norm() ? parabola : beside;
+}
+
+template <class Sample>
+template <class Between>
+Eigen::Vector3d SampledMotion<Sample>::slope(std::size_t k, double same, const Between& between) const
+{
+  const std::size_t last = times_.size() - 1;
+  const auto shift = [&](std::size_t j) -> Eigen::Vector3d { return between(j - 1, j); };
+  const auto chord = [&](std::size_t j) -> Eigen::Vector3d { return shift(j) / (times_[j] - times_[j - 1]); };
+  if (k > 0 && k < last)
+  {
+    if (pausesAt(times_, k, growing_, same, shift))
+      return Eigen::Vector3d::Zero();
+    return threePointSlope(times_[k] - times_[k - 1], between(k, k - 1), times_[k + 1] - times_[k], between(k, k + 1));
+  }
+  if (k > 0 && coast_ > 0)
+    return chord(k);
+  if (k == 0 && last == 1 && moving_start_)
+    return chord(1);
+  if (k == 0 && last > 1 && moving_start_)
+  {
+    // The parabola through the first three samples has its mean slope over the first two in their chord.
+    const Eigen::Vector3d next = slope(1, same, between);
+    return (times_[1] - times_[0]) * burst_ratio < times_[2] - times_[1] ? next
+                                                                         : Eigen::Vector3d(2.0 * chord(1) - next);
+  }
+  if (!isCut(times_, k, cut_))
+    return Eigen::Vector3d::Zero();   // at rest if the motion is held beyond the end
+  return cutSlope(chord(k == 0 ? 1 : k), slope(k == 0 ? 1 : k - 1, same, between));
 }
 
 /// Weights of the end value and of both slopes at the share s of a segment of length h that starts at zero, and their

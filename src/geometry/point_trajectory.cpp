@@ -26,51 +26,18 @@ void PointTrajectory::append(double time, const Eigen::Matrix3Xd& points)
   if (!times_.empty() && !(time > times_.back()))
     throw std::invalid_argument(who + "time " + std::to_string(time) + " s is not after " +
                                 std::to_string(times_.back()) + " s");
-  if (!frames_.empty() && points.cols() != frames_.front().cols())
+  if (!samples_.empty() && points.cols() != samples_.front().cols())
     throw std::invalid_argument(who + "has " + std::to_string(points.cols()) + " points, " +
-                                std::to_string(frames_.front().cols()) + " expected");
+                                std::to_string(samples_.front().cols()) + " expected");
   times_.push_back(time);
-  frames_.push_back(points);
+  samples_.push_back(points);
 }
 
-void PointTrajectory::forgetBefore(double time)
+Eigen::Vector3d PointTrajectory::slopeOf(std::size_t k, Eigen::Index i) const
 {
-  // The segment of `time` starts at the last frame not after it. The slope there needs one frame more, and up to three
-  // where it may be in a pause.
-  const auto after = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin();
-  const auto drop = std::max<std::ptrdiff_t>(0, after - 4);
-  times_.erase(times_.begin(), times_.begin() + drop);
-  frames_.erase(frames_.begin(), frames_.begin() + drop);
-}
-
-Eigen::Vector3d PointTrajectory::chord(std::size_t k, Eigen::Index i) const
-{
-  return (frames_[k].col(i) - frames_[k - 1].col(i)) / (times_[k] - times_[k - 1]);
-}
-
-Eigen::Vector3d PointTrajectory::slope(std::size_t k, Eigen::Index i) const
-{
-  if (k > 0 && k + 1 == times_.size() && coast_ > 0)
-    return chord(k, i);
-  if (k == 0 && times_.size() == 2 && moving_start_)
-    return chord(1, i);
-  if (k == 0 && times_.size() > 2 && moving_start_)   // of the parabola through the first three frames, whose mean
-                                                      // slope over the first two is the chord
-  {
-    const Eigen::Vector3d next = slope(1, i);
-    return (times_[1] - times_[0]) * burst_ratio < times_[2] - times_[1] ? next
-                                                                         : Eigen::Vector3d(2.0 * chord(1, i) - next);
-  }
-  if ((k == 0 || k + 1 >= times_.size()) && isCut(times_, k, cut_))
-    return cutSlope(chord(k == 0 ? 1 : k, i), slope(k == 0 ? 1 : k - 1, i));
-  if (k == 0 || k + 1 >= times_.size())
-    return Eigen::Vector3d::Zero();   // held beyond the ends
-  const auto shift = [this, i](std::size_t j) { return Eigen::Vector3d(frames_[j].col(i) - frames_[j - 1].col(i)); };
-  if (pausesAt(times_, k, growing_, 0.0, shift))
-    return Eigen::Vector3d::Zero();
-  const Eigen::Vector3d here = frames_[k].col(i);
-  return threePointSlope(times_[k] - times_[k - 1], frames_[k - 1].col(i) - here, times_[k + 1] - times_[k],
-                         frames_[k + 1].col(i) - here);
+  return slope(k, 0.0, [this, i](std::size_t a, std::size_t b) -> Eigen::Vector3d {
+    return samples_[b].col(i) - samples_[a].col(i);
+  });
 }
 
 void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Matrix3Xd* velocities) const
@@ -78,7 +45,7 @@ void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Mat
   const bool early = moving_start_ ? time < times_.front() : time <= times_.front();
   if (early || time >= times_.back() || times_.size() == 1)
   {
-    points = time <= times_.front() ? frames_.front() : frames_.back();
+    points = time <= times_.front() ? samples_.front() : samples_.back();
     if (velocities)
       velocities->setZero(3, points.cols());
     if (time < times_.back() || times_.size() == 1 || !(coast_ > 0))
@@ -86,7 +53,7 @@ void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Mat
     const double after = std::min(time - times_.back(), coast_);
     for (Eigen::Index i = 0; i < points.cols(); ++i)
     {
-      const Eigen::Vector3d v = slope(times_.size() - 1, i);
+      const Eigen::Vector3d v = slopeOf(times_.size() - 1, i);
       points.col(i) += after * (1.0 - 0.5 * after / coast_) * v;
       if (velocities)
         velocities->col(i) = (1.0 - after / coast_) * v;
@@ -96,13 +63,13 @@ void PointTrajectory::evaluate(double time, Eigen::Matrix3Xd& points, Eigen::Mat
   const std::size_t k = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin() - 1;
   const double h = times_[k + 1] - times_[k];
   const HermiteWeights w((time - times_[k]) / h, h);
-  points.resize(3, frames_[k].cols());
+  points.resize(3, samples_[k].cols());
   if (velocities)
     velocities->resize(3, points.cols());
   for (Eigen::Index i = 0; i < points.cols(); ++i)
   {
-    const Eigen::Vector3d a = frames_[k].col(i), whole = frames_[k + 1].col(i) - a, from = slope(k, i),
-                          to = slope(k + 1, i);
+    const Eigen::Vector3d a = samples_[k].col(i), whole = samples_[k + 1].col(i) - a, from = slopeOf(k, i),
+                          to = slopeOf(k + 1, i);
     points.col(i) = a + w.h01 * whole + w.h10 * from + w.h11 * to;
     if (velocities)
       velocities->col(i) = w.d01 * whole + w.d10 * from + w.d11 * to;

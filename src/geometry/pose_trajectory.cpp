@@ -39,7 +39,7 @@ PoseTrajectory::PoseTrajectory(std::vector<double> times, std::vector<Pose> pose
                                 std::to_string(poses.size()) + " poses; needs as many of both, at least one");
   }
   times_.reserve(times.size());
-  poses_.reserve(times.size());
+  samples_.reserve(times.size());
   for (std::size_t k = 0; k < times.size(); ++k)
     append(times[k], poses[k]);
 }
@@ -53,58 +53,18 @@ void PoseTrajectory::append(double time, const Pose& pose)
                                 std::to_string(times_.back()) + " s; times must increase");
   }
   times_.push_back(time);
-  poses_.push_back({pose.position, pose.orientation.normalized()});
+  samples_.push_back({pose.position, pose.orientation.normalized()});
 }
 
-void PoseTrajectory::forgetBefore(double time)
+Twist PoseTrajectory::slopeAt(std::size_t k) const
 {
-  // The segment of `time` starts at the last sample not after it. The slope there needs one sample more, and up to
-  // three where it may be in a pause.
-  const auto after = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin();
-  const auto drop = std::max<std::ptrdiff_t>(0, after - 4);
-  times_.erase(times_.begin(), times_.begin() + drop);
-  poses_.erase(poses_.begin(), poses_.begin() + drop);
-}
-
-Twist PoseTrajectory::slope(std::size_t k) const
-{
-  if (k > 0 && k + 1 == times_.size() && coast_ > 0)
-  {
-    const double h = times_[k] - times_[k - 1];
-    return {(poses_[k].position - poses_[k - 1].position) / h,
-            rotationVector(poses_[k - 1].orientation.conjugate() * poses_[k].orientation) / h};
-  }
-  if (k == 0 || k + 1 >= times_.size())
-    return isCut(times_, k, cut_) ? endSlope(k) : Twist();   // at rest if the pose is held beyond the end
-  const double h0 = times_[k] - times_[k - 1], h1 = times_[k + 1] - times_[k];
-  const Eigen::Quaterniond back = poses_[k].orientation.conjugate();
-  const auto shift = [this](std::size_t j) { return Eigen::Vector3d(poses_[j].position - poses_[j - 1].position); };
-  const auto turn = [this](std::size_t j) {
-    return rotationVector(poses_[j - 1].orientation.conjugate() * poses_[j].orientation);
+  const auto shift = [this](std::size_t a, std::size_t b) -> Eigen::Vector3d {
+    return samples_[b].position - samples_[a].position;
   };
-  Twist slope;
-  if (!pausesAt(times_, k, growing_, same_position, shift))
-  {
-    slope.linear = threePointSlope(h0, poses_[k - 1].position - poses_[k].position, h1,
-                                   poses_[k + 1].position - poses_[k].position);
-  }
-  if (!pausesAt(times_, k, growing_, same_orientation, turn))
-  {
-    slope.angular = threePointSlope(h0, rotationVector(back * poses_[k - 1].orientation), h1,
-                                    rotationVector(back * poses_[k + 1].orientation));
-  }
-  return slope;
-}
-
-Twist PoseTrajectory::endSlope(std::size_t k) const
-{
-  const std::size_t first = k == 0 ? 0 : k - 1, second = first + 1, beside = k == 0 ? 1 : k - 1;
-  const double h = times_[second] - times_[first];
-  const Pose &a = poses_[first], &b = poses_[second];
-  const Twist next = slope(beside);
-  // The angular slope is in the axes of the sample. The rotation from a to b has the same vector in the axes of both.
-  const Eigen::Vector3d turn = rotationVector(a.orientation.conjugate() * b.orientation) / h;
-  return {cutSlope((b.position - a.position) / h, next.linear), cutSlope(turn, next.angular)};
+  const auto turn = [this](std::size_t a, std::size_t b) {
+    return rotationVector(samples_[a].orientation.conjugate() * samples_[b].orientation);
+  };
+  return {slope(k, same_position, shift), slope(k, same_orientation, turn)};
 }
 
 Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
@@ -114,11 +74,11 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
     if (velocity)
       *velocity = {};
     if (time < times_.back() || times_.size() == 1 || !(coast_ > 0))
-      return time <= times_.front() ? poses_.front() : poses_.back();
+      return time <= times_.front() ? samples_.front() : samples_.back();
     const double after = std::min(time - times_.back(), coast_), way = after * (1.0 - 0.5 * after / coast_),
                  speed = 1.0 - after / coast_;
-    const Twist last = slope(times_.size() - 1);   // the turn about a fixed axis: body and world rates agree
-    const Pose& end = poses_.back();
+    const Twist last = slopeAt(times_.size() - 1);   // the turn about a fixed axis: body and world rates agree
+    const Pose& end = samples_.back();
     if (velocity)
     {
       velocity->linear = speed * last.linear;
@@ -129,11 +89,11 @@ Pose PoseTrajectory::evaluate(double time, Twist* velocity) const
   const std::size_t k = std::upper_bound(times_.begin(), times_.end(), time) - times_.begin() - 1;
   const double h = times_[k + 1] - times_[k];
   const double s = (time - times_[k]) / h;
-  const Twist from = slope(k), to = slope(k + 1);
+  const Twist from = slopeAt(k), to = slopeAt(k + 1);
 
   const HermiteWeights w(s, h);
-  const Pose& a = poses_[k];
-  const Pose& b = poses_[k + 1];
+  const Pose& a = samples_[k];
+  const Pose& b = samples_[k + 1];
   const Eigen::Vector3d whole = rotationVector(a.orientation.conjugate() * b.orientation);
   const Eigen::Vector3d rate0 = from.angular;   // phi' = body rate where phi = 0
   const Eigen::Vector3d rate1 = rotationRate(-whole).inverse() * to.angular;

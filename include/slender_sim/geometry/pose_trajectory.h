@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "slender_sim/geometry/pose.h"
+#include "slender_sim/geometry/sampled_motion.h"
 
 namespace slender {
 
@@ -20,7 +21,7 @@ namespace slender {
 /// short. Two equal samples on both sides of the turning point of a swing are not a pause: the accelerations before, at
 /// and after them then agree to within a third. q and -q are the same orientation. Between two samples the rotation
 /// takes the shorter way, so each half turn needs more than one sample.
-class PoseTrajectory
+class PoseTrajectory : public SampledMotion<Pose>
 {
 public:
   PoseTrajectory() = default;
@@ -30,26 +31,11 @@ public:
 
   /// Appends a later sample; throws std::invalid_argument when time is not after the last one.
   void append(double time, const Pose& pose);
-  /// After the last sample the motion goes on with the mean velocity since the one before, which dies out linearly
-  /// within `duration` [s] (>= 0; 0: held).
-  void coast(double duration) { coast_ = duration; }
-  /// From now on more samples may come: two equal ones at the end may be the turning point of a swing, and are no pause
-  /// yet.
-  void expectMore() { growing_ = true; }
-  /// Says that the samples may begin and end in the middle of a motion. If the first or last interval is shorter than
-  /// `interval` [s], the slope at this end is that of the parabola through the three outermost samples, but at most the
-  /// slope of the neighbouring sample. With 0 both ends are at rest. Outside of the samples the pose is held in any
-  /// case, so that the velocity jumps at such an end.
-  void cutWithin(double interval) { cut_ = interval; }
-  /// Forgets samples that no query at or after `time` needs.
-  void forgetBefore(double time);
 
-  bool empty() const { return times_.empty(); }
   double firstTime() const { return times_.front(); }
   double lastTime() const { return times_.back(); }
   /// The samples that were given and not forgotten.
-  const std::vector<double>& times() const { return times_; }
-  const std::vector<Pose>& poses() const { return poses_; }
+  const std::vector<Pose>& poses() const { return samples_; }
   std::size_t size() const { return times_.size(); }
 
   /// Pose and velocity at `time`; not empty.
@@ -57,14 +43,7 @@ public:
 
 private:
   /// Velocity of sample k by differences: linear in world axes, angular in the axes of the sample itself.
-  Twist slope(std::size_t k) const;
-  /// Slope at sample k, the first or the last one, where cutWithin() applies.
-  Twist endSlope(std::size_t k) const;
-
-  std::vector<double> times_;
-  std::vector<Pose> poses_;
-  double coast_ = 0.0, cut_ = 0.0;
-  bool growing_ = false;   ///< see expectMore()
+  Twist slopeAt(std::size_t k) const;
 };
 
 }   // namespace slender
