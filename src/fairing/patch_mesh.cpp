@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "geometry/edge_flips.h"
+
 namespace slender {
 
 namespace {
@@ -15,8 +17,6 @@ using Eigen::Vector3i;
 constexpr int kPasses = 60;   ///< of refinement: each at least halves what is too long
 
 double cotangent(const Vector3d& u, const Vector3d& v) { return u.dot(v) / std::max(u.cross(v).norm(), 1e-300); }
-
-std::pair<int, int> sorted(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
 
 }   // namespace
 
@@ -48,37 +48,9 @@ bool PatchMesh::canFlip(int a, int b, int c, int d) const
 
 void PatchMesh::flip()
 {
-  std::map<std::pair<int, int>, int> face_of;   // directed edge
-  const auto enter = [&](int f) {
-    for (int k = 0; k < 3; ++k)
-      face_of[{faces_[f][k], faces_[f][(k + 1) % 3]}] = f;
-  };
-  for (int f = 0; f < static_cast<int>(faces_.size()); ++f)
-    enter(f);
-  std::vector<std::pair<int, int>> open;
-  for (const auto& entry : face_of)
-    if (entry.first.first < entry.first.second)
-      open.push_back(entry.first);
-  // Flips of curved patches may run in circles; each edge's turn comes a few times at most on the way to Delaunay.
-  for (std::size_t left = 50 * open.size(); left > 0 && !open.empty(); --left)
-  {
-    const auto [a, b] = open.back();
-    open.pop_back();
-    const auto over = face_of.find({a, b}), under = face_of.find({b, a});
-    if (over == face_of.end() || under == face_of.end())
-      continue;
-    const int f = over->second, g = under->second, c = faces_[f].sum() - a - b, d = faces_[g].sum() - a - b;
-    if (face_of.count({c, d}) || face_of.count({d, c}) || taken_.count(sorted(c, d)) || !canFlip(a, b, c, d))
-      continue;
-    face_of.erase(over);
-    face_of.erase({b, a});
-    faces_[f] = {c, a, d};
-    faces_[g] = {d, b, c};
-    enter(f);
-    enter(g);
-    for (const auto& [s, t] : {std::pair{a, d}, std::pair{d, b}, std::pair{b, c}, std::pair{c, a}})
-      open.emplace_back(s, t);
-  }
+  flipEdges(faces_, [this](int a, int b, int c, int d) {
+    return !taken_.count({std::min(c, d), std::max(c, d)}) && canFlip(a, b, c, d);
+  });
 }
 
 int PatchMesh::refine()

@@ -55,12 +55,7 @@ TriangleMesh readCollada(const std::string& path)
   add(*scene->mRootNode, aiMatrix4x4());
   if (triangles.empty())
     throw std::runtime_error(path + ": has no triangles");
-  TriangleMesh result;
-  result.vertices =
-      Eigen::Map<const Eigen::Matrix3Xd>(vertices[0].data(), 3, static_cast<Eigen::Index>(vertices.size()));
-  result.triangles =
-      Eigen::Map<const Eigen::Matrix3Xi>(triangles[0].data(), 3, static_cast<Eigen::Index>(triangles.size()));
-  return result;
+  return triangleMesh(vertices, triangles);
 }
 
 #else

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -11,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "edge_flips.h"
 #include "slender_sim/geometry/mesh_subdivision.h"
 
 namespace slender {
@@ -20,18 +20,6 @@ namespace {
 constexpr double kRowHeight = 0.86602540378443864676;   // of an equilateral triangle of side 1
 
 using Faces = std::vector<Eigen::Vector3i>;
-
-TriangleMesh meshOf(const std::vector<Eigen::Vector3d>& vertices, const Faces& faces)
-{
-  TriangleMesh mesh;
-  mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices.size()));
-  mesh.triangles.resize(3, static_cast<Eigen::Index>(faces.size()));
-  for (std::size_t i = 0; i < vertices.size(); ++i)
-    mesh.vertices.col(i) = vertices[i];
-  for (std::size_t i = 0; i < faces.size(); ++i)
-    mesh.triangles.col(i) = faces[i];
-  return mesh;
-}
 
 TriangleMesh rightAngled(double width, double height, int columns, int rows, bool alternating)
 {
@@ -55,7 +43,7 @@ TriangleMesh rightAngled(double width, double height, int columns, int rows, boo
         faces.emplace_back(a, c, d);
       }
     }
-  return meshOf(vertices, faces);
+  return triangleMesh(vertices, faces);
 }
 
 TriangleMesh equilateral(double width, double height, int columns, int rows)
@@ -83,53 +71,21 @@ TriangleMesh equilateral(double width, double height, int columns, int rows)
       if (i < columns)
         add(even, even + 1, odd + 1);
     }
-  return meshOf(vertices, faces);
+  return triangleMesh(vertices, faces);
 }
 
-/// Lawson's flips of the inner edges of a plane mesh until it is Delaunay.
-void makeDelaunay(TriangleMesh& mesh)
+/// Whether the flip of edge a-b brings a plane mesh nearer to Delaunay: d lies inside the circle through a, b, c.
+bool insideCircle(const Eigen::Matrix3Xd& vertices, int a, int b, int c, int d)
 {
-  const auto faces = mesh.triangles.cols();
-  std::map<std::pair<int, int>, int> face_of;   // directed edge -> face
-  const auto enter = [&](int f) {
-    for (int k = 0; k < 3; ++k)
-      face_of[{mesh.triangles(k, f), mesh.triangles((k + 1) % 3, f)}] = f;
-  };
-  for (int f = 0; f < faces; ++f)
-    enter(f);
-  std::vector<std::pair<int, int>> open;
-  for (const auto& [edge, f] : face_of)
-    if (edge.first < edge.second && face_of.count({edge.second, edge.first}))
-      open.push_back(edge);
-  const auto third = [&](int f, int a, int b) { return mesh.triangles.col(f).sum() - a - b; };
-  const auto p = [&](int v) { return mesh.vertices.col(v).head<2>(); };
-  while (!open.empty())
+  const auto p = [&](int v) { return vertices.col(v).head<2>(); };
+  Eigen::Matrix3d m;
+  const int corners[3] = {a, b, c};
+  for (int k = 0; k < 3; ++k)
   {
-    const auto [a, b] = open.back();
-    open.pop_back();
-    const auto left = face_of.find({a, b}), right = face_of.find({b, a});
-    if (left == face_of.end() || right == face_of.end())
-      continue;
-    const int f = left->second, g = right->second, c = third(f, a, b), d = third(g, a, b);
-    // d inside the circle through a, b, c
-    Eigen::Matrix3d m;
-    const int corners[3] = {a, b, c};
-    for (int k = 0; k < 3; ++k)
-    {
-      const Eigen::Vector2d r = p(corners[k]) - p(d);
-      m.row(k) << r[0], r[1], r.squaredNorm();
-    }
-    if (m.determinant() <= 1e-9 * std::pow((p(a) - p(b)).norm(), 4))
-      continue;
-    face_of.erase(left);
-    face_of.erase({b, a});
-    mesh.triangles.col(f) << c, a, d;
-    mesh.triangles.col(g) << d, b, c;
-    enter(f);
-    enter(g);
-    for (const auto& [s, t] : {std::pair{a, d}, std::pair{d, b}, std::pair{b, c}, std::pair{c, a}})
-      open.emplace_back(s, t);
+    const Eigen::Vector2d r = p(corners[k]) - p(d);
+    m.row(k) << r[0], r[1], r.squaredNorm();
   }
+  return m.determinant() > 1e-9 * std::pow((p(a) - p(b)).norm(), 4);
 }
 
 TriangleMesh irregular(double width, double height, int columns, int rows, unsigned seed)
@@ -147,7 +103,12 @@ TriangleMesh irregular(double width, double height, int columns, int rows, unsig
     x += side ? 0.0 : std::clamp(dx, -0.3 * x, 0.3 * (width - x));
     y += end ? 0.0 : dy;
   }
-  makeDelaunay(mesh);
+  Faces faces;
+  for (Eigen::Index f = 0; f < mesh.triangles.cols(); ++f)
+    faces.emplace_back(mesh.triangles.col(f));
+  flipEdges(faces, [&](int a, int b, int c, int d) { return insideCircle(mesh.vertices, a, b, c, d); });
+  for (std::size_t f = 0; f < faces.size(); ++f)
+    mesh.triangles.col(static_cast<Eigen::Index>(f)) = faces[f];
   return mesh;
 }
 
@@ -202,7 +163,7 @@ TriangleMesh discMesh(double radius, int rings)
           faces.emplace_back(vertex(ring - 1, inner), vertex(ring, outer + 1), vertex(ring - 1, inner + 1));
       }
   }
-  return meshOf(vertices, faces);
+  return triangleMesh(vertices, faces);
 }
 
 TriangleMesh icosphere(double radius, int levels)
@@ -215,7 +176,7 @@ TriangleMesh icosphere(double radius, int levels)
   Faces faces{{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
               {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
               {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
-  TriangleMesh mesh = meshOf(vertices, faces);
+  TriangleMesh mesh = triangleMesh(vertices, faces);
   const auto blowUp = [&] { mesh.vertices = radius * mesh.vertices.colwise().normalized(); };
   blowUp();
   for (int level = 0; level < levels; ++level)

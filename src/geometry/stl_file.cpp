@@ -42,22 +42,14 @@ public:
   {
     if (triangles_.empty())
       throw std::runtime_error(path + ": has no triangles");
-    TriangleMesh mesh;
-    mesh.vertices.resize(3, static_cast<Eigen::Index>(vertices_.size()));
-    for (std::size_t i = 0; i < vertices_.size(); ++i)
-      mesh.vertices.col(static_cast<Eigen::Index>(i)) = vertices_[i];
-    mesh.triangles.resize(3, static_cast<Eigen::Index>(triangles_.size()));
-    for (std::size_t i = 0; i < triangles_.size(); ++i)
-      for (int k = 0; k < 3; ++k)
-        mesh.triangles(k, static_cast<Eigen::Index>(i)) = triangles_[i][k];
-    return mesh;
+    return triangleMesh(vertices_, triangles_);
   }
 
 private:
   std::vector<Eigen::Vector3d> vertices_;
-  std::vector<std::array<int, 3>> triangles_;
+  std::vector<Eigen::Vector3i> triangles_;
   std::map<std::array<double, 3>, int> numbers_;
-  std::array<int, 3> triangle_{};
+  Eigen::Vector3i triangle_ = Eigen::Vector3i::Zero();
   int corners_ = 0;
 };
 

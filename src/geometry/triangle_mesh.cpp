@@ -4,6 +4,16 @@
 
 namespace slender {
 
+TriangleMesh triangleMesh(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Eigen::Vector3i>& triangles)
+{
+  TriangleMesh mesh{Eigen::Matrix3Xd(3, vertices.size()), Eigen::Matrix3Xi(3, triangles.size())};
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    mesh.vertices.col(static_cast<Eigen::Index>(i)) = vertices[i];
+  for (std::size_t f = 0; f < triangles.size(); ++f)
+    mesh.triangles.col(static_cast<Eigen::Index>(f)) = triangles[f];
+  return mesh;
+}
+
 Eigen::VectorXd faceAreas(const TriangleMesh& mesh)
 {
   Eigen::VectorXd areas(mesh.triangles.cols());

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 namespace slender {
@@ -9,6 +11,8 @@ struct TriangleMesh
   Eigen::Matrix3Xd vertices;    ///< 3 x n [m]
   Eigen::Matrix3Xi triangles;   ///< 3 x m, counter-clockwise seen from outside
 };
+
+TriangleMesh triangleMesh(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Eigen::Vector3i>& triangles);
 
 /// Area of each face [m^2].
 Eigen::VectorXd faceAreas(const TriangleMesh& mesh);

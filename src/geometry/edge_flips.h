@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace slender {
+
+/// Lawson's flips of the edges between two faces, until no edge a-b with the face of c left of it and that of d right
+/// of it is left for which wanted(a, b, c, d) is true. Flips of curved meshes may run in circles, so each edge gets a
+/// few dozen turns at most; on the way to a Delaunay mesh it needs a few.
+template <class Wanted>
+void flipEdges(std::vector<Eigen::Vector3i>& faces, const Wanted& wanted)
+{
+  constexpr std::size_t kTurns = 50;
+  std::map<std::pair<int, int>, int> face_of;   // directed edge
+  const auto enter = [&](int f) {
+    for (int k = 0; k < 3; ++k)
+      face_of[{faces[f][k], faces[f][(k + 1) % 3]}] = f;
+  };
+  for (int f = 0; f < static_cast<int>(faces.size()); ++f)
+    enter(f);
+  std::vector<std::pair<int, int>> open;
+  for (const auto& entry : face_of)
+    if (entry.first.first < entry.first.second)
+      open.push_back(entry.first);
+  for (std::size_t left = kTurns * open.size(); left > 0 && !open.empty(); --left)
+  {
+    const auto [a, b] = open.back();
+    open.pop_back();
+    const auto over = face_of.find({a, b}), under = face_of.find({b, a});
+    if (over == face_of.end() || under == face_of.end())
+      continue;
+    const int f = over->second, g = under->second, c = faces[f].sum() - a - b, d = faces[g].sum() - a - b;
+    if (face_of.count({c, d}) || face_of.count({d, c}) || !wanted(a, b, c, d))
+      continue;
+    face_of.erase(over);
+    face_of.erase({b, a});
+    faces[f] = {c, a, d};
+    faces[g] = {d, b, c};
+    enter(f);
+    enter(g);
+    for (const auto& [s, t] : {std::pair{a, d}, std::pair{d, b}, std::pair{b, c}, std::pair{c, a}})
+      open.emplace_back(s, t);
+  }
+}
+
+}   // namespace slender
