@@ -11,6 +11,7 @@ target_link_libraries(slender_sim_node PUBLIC slender_sim ${catkin_LIBRARIES} PR
 
 foreach(node scene_node rod_node thread_node cloth_node tracking_node fairing_node motion_player rviz_on_scene)
   add_executable(${node} ${PROJECT_SOURCE_DIR}/src/nodes/${node}.cpp)
+  target_include_directories(${node} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/src/node)
   target_link_libraries(${node} PRIVATE slender_sim_node)
 endforeach()
 

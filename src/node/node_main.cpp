@@ -1,15 +1,34 @@
 #include "slender_sim/node/node_main.h"
 
+#include <csignal>
 #include <exception>
 #include <iostream>
 
 #include <ros/init.h>
 
+#include "slender_sim/linalg/interruption.h"
 #include "slender_sim/node/arguments.h"
 #include "slender_sim/node/scene_node.h"
-#include "slender_sim/node/signals.h"
 
 namespace slender {
+namespace {
+
+/// SIGINT and SIGTERM end the step that is being solved and ask for shutdown, which finishes the bag. A second one ends
+/// the process at once. Needs ros::init() with NoSigintHandler: roscpp would replace the first handler as the node
+/// starts.
+void stopOnSignals()
+{
+  struct sigaction action = {};
+  action.sa_handler = [](int) {
+    interruptSteps();
+    ros::requestShutdown();
+  };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  for (const int signal : {SIGINT, SIGTERM})
+    ::sigaction(signal, &action, nullptr);
+}
+
+}   // namespace
 
 int nodeMain(int argc, char** argv, const char* name, const std::function<int()>& run)
 try

@@ -1,19 +1,22 @@
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <set>
 #include <string>
 
 #include <geometry_msgs/TransformStamped.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <tf2_ros/static_transform_broadcaster.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include "export_program.h"
 #include "holder_meshes.h"
+#include "marker_tools.h"
 #include "object_colors.h"
 #include "param_reader.h"
 #include "slender_sim/node/arguments.h"
-#include "slender_sim/node/mesh_markers.h"
+#include "slender_sim/scene/snapshot_meshes.h"
 
 /// marker_player shows a bag that a node or `simulate` has recorded. It publishes the recorded objects on `markers` at
 /// the recorded pace and simulates nothing. docs/operation.md lists its parameters.
@@ -44,10 +47,17 @@ struct Settings
   }
 };
 
+const char* folderOf(ObjectKind kind)
+{
+  // Obstacles have one namespace, as in the markers of nodes.
+  static const char* const folders[] = {"rods/", "threads/", "cloths/", "bodies/", "obstacles", "grasps/", "nozzles/"};
+  return folders[static_cast<int>(kind)];
+}
+
 class MarkerPlayer
 {
 public:
-  explicit MarkerPlayer(Settings settings) : settings_(std::move(settings)), markers_(objectColor)
+  explicit MarkerPlayer(Settings settings) : settings_(std::move(settings))
   {
     open();   // before advertising, so that a bag that cannot be read is reported at once
     publisher_ = nh_.advertise<visualization_msgs::MarkerArray>("markers", 2, true);
@@ -118,14 +128,45 @@ private:
     std_msgs::Header header;
     header.stamp = ros::Time::now();
     header.frame_id = settings_.frame_id;
-    publisher_.publish(markers_.picture(header, objects));
+    publisher_.publish(picture(header, objects));
+  }
+
+  /// Returns the next picture. Markers of meshes that no longer exist are deleted.
+  visualization_msgs::MarkerArray picture(const std_msgs::Header& header, const std::vector<ObjectMesh>& objects)
+  {
+    visualization_msgs::MarkerArray out;
+    std::set<std::string> shown;
+    int obstacles = 0;
+    for (const ObjectMesh& object : objects)
+    {
+      const bool obstacle = object.kind == ObjectKind::obstacle;
+      std::string ns = folderOf(object.kind) + (obstacle ? "" : object.name);
+      for (int copy = 2; !obstacle && shown.count(ns); ++copy)
+        ns = folderOf(object.kind) + object.name + "_" + std::to_string(copy);
+      visualization_msgs::Marker marker =
+          makeMarker(header, ns, obstacle ? obstacles++ : 0, visualization_msgs::Marker::TRIANGLE_LIST);
+      const Eigen::Vector3d paint = objectColor(object.kind, object.index);
+      marker.color = color(paint.x(), paint.y(), paint.z());
+      paintMesh(object.mesh, marker);
+      out.markers.push_back(std::move(marker));
+      if (!obstacle)
+        shown.insert(ns);
+    }
+    for (const std::string& ns : shown_)
+      if (!shown.count(ns))
+      {
+        out.markers.push_back(makeMarker(header, ns, 0, visualization_msgs::Marker::TRIANGLE_LIST));
+        out.markers.back().action = visualization_msgs::Marker::DELETE;
+      }
+    shown_ = std::move(shown);
+    return out;
   }
 
   ros::NodeHandle nh_;
   Settings settings_;
-  MeshMarkers markers_;
   std::unique_ptr<BagReader> bag_;
   bool told_ = false;
+  std::set<std::string> shown_;   // namespaces of the last picture
   Eigen::AlignedBox3d planes_box_;
   tf2_ros::StaticTransformBroadcaster frame_;
   ros::Publisher publisher_;
