@@ -7,7 +7,8 @@ namespace {
 
 struct Stamped
 {
-  ros::Time stamp;
+  int source = 0;
+  ros::Time stamp{};
   int number = 0;
 };
 
@@ -18,8 +19,8 @@ protected:
 
   Arrival arrive(double stamp, int source = 0)
   {
-    Stamped message{ros::Time(stamp), ++number_};
-    const Arrival arrival = paused_.arrive(source, message);
+    Stamped message{source, ros::Time(stamp), ++number_};
+    const Arrival arrival = paused_.arrive(message);
     completed_ = message.stamp;
     return arrival;
   }
@@ -31,7 +32,7 @@ protected:
   std::vector<int> release(bool all)
   {
     std::vector<int> numbers;
-    for (const auto& [source, message] : paused_.release(all))
+    for (const Stamped& message : paused_.release(all))
       numbers.push_back(message.number);
     return numbers;
   }

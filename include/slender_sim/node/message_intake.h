@@ -1,7 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -15,7 +21,6 @@
 #include "slender_sim/node/drop_counter.h"
 #include "slender_sim/node/node_options.h"
 #include "slender_sim/node/paused_messages.h"
-#include "slender_sim/node/pending_messages.h"
 #include "slender_sim/node/sim_clock.h"
 
 namespace slender {
@@ -55,8 +60,10 @@ enum class Use
   out_of_order,   ///< its stamp is not later than that of an earlier message
 };
 
-/// Passes messages on when tf knows their transforms. Messages that arrive while the simulation stands still are kept,
-/// see PausedMessages. Messages that cannot be used are counted as dropped. `Message` is derived from FramedMessage.
+/// Passes messages on when tf knows their transforms. Those of one source and frame keep their order; others may
+/// overtake them, so that a frame that nobody knows holds back nothing else. Messages that arrive while the simulation
+/// stands still are kept, see PausedMessages. Messages that cannot be used are counted as dropped. `Message` is derived
+/// from FramedMessage.
 template <class Message>
 class MessageIntake
 {
@@ -64,7 +71,8 @@ public:
   /// Uses a message. `X_WF` is the pose of its frame in ~frame_id.
   using User = std::function<Use(const Message& message, const Pose& X_WF)>;
 
-  /// At most `most_pending` messages wait for transforms. All references must outlive this object.
+  /// At most `most_pending` messages wait for transforms, a quarter of them of one source and frame. Each waits for
+  /// ~tf_timeout at most. All references must outlive this object.
   MessageIntake(const NodeOptions& options, const SimClock& clock, const tf2_ros::Buffer& tf, DropCounter& drops,
                 std::size_t most_pending, User user)
     : options_(options),
@@ -72,7 +80,8 @@ public:
       tf_(tf),
       drops_(drops),
       user_(std::move(user)),
-      pending_(most_pending, options.tf_timeout),
+      most_pending_(most_pending),
+      patience_(std::chrono::microseconds(static_cast<std::int64_t>(1e6 * options.tf_timeout))),
       paused_(clock, options.guide_timeout, options.guide_ahead)
   {
   }
@@ -84,7 +93,7 @@ public:
       return;
     message.frame = *frame;
     message.stamp = header.stamp;
-    const Arrival arrival = paused_.arrive(message.source, message);
+    const Arrival arrival = paused_.arrive(message);
     if (arrival == Arrival::kept)
       return drops_.keep(message.what);
     if (arrival != Arrival::now)
@@ -96,18 +105,32 @@ public:
   /// Uses messages whose transforms have arrived meanwhile; drops those that waited too long.
   void processPending()
   {
-    pending_.process([this](const Message& message, std::string* why) { return deliver(message, why); },
-                     [this](const Message& message, const std::string& why) {
-                       drops_.drop(Drop::no_transform, message.what,
-                                   "from " + message.frame + " to " + options_.frame_id + ": " + why);
-                     });
+    const auto now = std::chrono::steady_clock::now();   // wall time: simulated time may stand still
+    std::set<std::pair<int, std::string>> blocked;       // an earlier message of this source and frame still waits
+    for (std::size_t i = 0; i < pending_.size();)
+    {
+      const auto& [message, deadline] = pending_[i];
+      std::string why;
+      const std::pair key(message.source, message.frame);
+      const bool done = !blocked.count(key) && deliver(message, &why);
+      if (!done && (blocked.count(key) || now < deadline))
+      {
+        blocked.insert(key);
+        ++i;
+        continue;
+      }
+      if (!done)
+        drops_.drop(Drop::no_transform, message.what,
+                    "from " + message.frame + " to " + options_.frame_id + ": " + why);
+      pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
+    }
   }
 
   // See PausedMessages.
   void onPresent(std::function<ros::Time()> present) { paused_.onPresent(std::move(present)); }
   void takeKept(bool all)
   {
-    for (const auto& [source, message] : paused_.release(all))
+    for (const Message& message : paused_.release(all))
       takeNow(message);
   }
 
@@ -124,21 +147,29 @@ public:
   void takeOver(MessageIntake& before, const Change& change)
   {
     pending_ = std::move(before.pending_);
-    pending_.change(change);
-    paused_.takeOver(before.paused_, [&change](int& source, Message& message) {
-      const bool keep = change(message);
-      source = message.source;
-      return keep;
-    });
+    const auto lost = [&](Pending& pending) { return !change(pending.message); };
+    pending_.erase(std::remove_if(pending_.begin(), pending_.end(), lost), pending_.end());
+    paused_.takeOver(before.paused_, change);
   }
 
 private:
+  struct Pending
+  {
+    Message message;
+    std::chrono::steady_clock::time_point deadline;
+  };
+
   void takeNow(const Message& message)
   {
-    if (!pending_.holds(message) && deliver(message, nullptr))
+    const auto like = [&](const Pending& other) {
+      return other.message.source == message.source && other.message.frame == message.frame;
+    };
+    const auto before = static_cast<std::size_t>(std::count_if(pending_.begin(), pending_.end(), like));
+    if (before == 0 && deliver(message, nullptr))
       return;
-    if (!pending_.add(message))
-      drops_.drop(Drop::queue_full, message.what);
+    if (pending_.size() >= most_pending_ || 4 * before >= most_pending_)
+      return drops_.drop(Drop::queue_full, message.what);
+    pending_.push_back({message, std::chrono::steady_clock::now() + patience_});
   }
 
   /// Returns false while the transform is not known.
@@ -173,7 +204,9 @@ private:
   const tf2_ros::Buffer& tf_;
   DropCounter& drops_;
   const User user_;
-  PendingMessages<Message> pending_;
+  const std::size_t most_pending_;
+  const std::chrono::steady_clock::duration patience_;
+  std::deque<Pending> pending_;   // wait for their transforms
   PausedMessages<Message> paused_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <deque>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
@@ -25,7 +26,7 @@ enum class Arrival
 /// Keeps messages that arrive while the simulation is paused and the time of other nodes goes on. The stamps of these
 /// messages are ahead of the simulated time. The simulation uses them when it continues at the present time of the
 /// other nodes. For each source the class keeps the messages of the last `timeout` seconds, and always the last
-/// message. `Message` has a member `stamp`; stamp zero means now.
+/// message. `Message` has the members `source` and `stamp`; stamp zero means now.
 template <class Message>
 class PausedMessages
 {
@@ -40,7 +41,7 @@ public:
 
   /// Decides by its stamp how a message is treated. If the simulation runs, stamp zero is replaced by the present
   /// stamp. A message that is kept is copied.
-  Arrival arrive(int source, Message& message)
+  Arrival arrive(Message& message)
   {
     const double now = clock_.seconds(), present = present_ ? std::max(now, clock_.secondsAt(present_())) : now;
     const bool stands = present > now + kRounding;
@@ -48,7 +49,7 @@ public:
       message.stamp = clock_.stamp();
     if (message.stamp.isZero())
     {
-      auto& last = without_stamp_[source];
+      auto& last = without_stamp_[message.source];
       last.clear();
       last.push_back(message);
       return Arrival::kept;
@@ -58,7 +59,7 @@ public:
       return Arrival::from_future;
     if (time <= now + ahead_)
       return now - time > timeout_ ? Arrival::stale : Arrival::now;
-    std::deque<Message>& kept = with_stamp_[source];
+    std::deque<Message>& kept = with_stamp_[message.source];
     kept.push_back(message);
     while (kept.size() > 1 &&
            (kept.size() > kMostKept || clock_.secondsAt(kept.front().stamp) < std::min(present, time) - timeout_))
@@ -69,39 +70,34 @@ public:
   /// Returns and forgets kept messages, in the order of their stamps. With `all` the simulation continues at the
   /// present time, and all messages are returned. Otherwise it takes only a few steps, and messages without a stamp are
   /// returned.
-  std::vector<std::pair<int, Message>> release(bool all)
+  std::vector<Message> release(bool all)
   {
-    std::vector<std::pair<int, Message>> out;
+    std::vector<Message> out;
     const auto move = [&out](std::map<int, std::deque<Message>>& from) {
       for (auto& [source, messages] : from)
-        for (Message& message : messages)
-          out.emplace_back(source, std::move(message));
+        std::move(messages.begin(), messages.end(), std::back_inserter(out));
       from.clear();
     };
     if (all)
       move(with_stamp_);
-    std::stable_sort(out.begin(), out.end(),
-                     [](const auto& a, const auto& b) { return a.second.stamp < b.second.stamp; });
+    std::stable_sort(out.begin(), out.end(), [](const Message& a, const Message& b) { return a.stamp < b.stamp; });
     const std::size_t stamped = out.size();
     move(without_stamp_);
     for (std::size_t k = stamped; k < out.size(); ++k)
-      out[k].second.stamp = clock_.stamp();
+      out[k].stamp = clock_.stamp();
     return out;
   }
 
-  /// Takes over the messages of another object. change(source, message) may change its arguments. If it returns false,
-  /// the message is dropped.
+  /// Takes over the messages of another object. change(message) may change its argument. If it returns false, the
+  /// message is dropped.
   template <class Change>
   void takeOver(PausedMessages& before, const Change& change)
   {
     const auto move = [&change](std::map<int, std::deque<Message>>& from, std::map<int, std::deque<Message>>& to) {
       for (auto& [source, messages] : from)
         for (Message& message : messages)
-        {
-          int now = source;
-          if (change(now, message))
-            to[now].push_back(std::move(message));
-        }
+          if (change(message))
+            to[message.source].push_back(std::move(message));
     };
     move(before.with_stamp_, with_stamp_);
     move(before.without_stamp_, without_stamp_);
