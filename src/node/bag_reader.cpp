@@ -21,7 +21,6 @@
 #include "slender_sim/scene/file_paths.h"
 #include "slender_sim/scene/reader.h"
 #include "message_snapshots.h"
-#include "topic_stream.h"
 
 namespace slender {
 namespace {
@@ -39,6 +38,67 @@ double shortestStep(double span_ns, double steps)
 }
 
 }   // namespace
+
+/// The messages of one topic, in the order of their stamps.
+class Stream
+{
+public:
+  virtual ~Stream() = default;
+  bool alive() const { return alive_; }
+  const ros::Time& stamp() const { return stamp_; }
+  /// Hands the current message over and goes on to the next one.
+  virtual void take() = 0;
+  virtual std::size_t size() = 0;   ///< number of messages
+
+protected:
+  bool alive_ = false;
+  ros::Time stamp_;
+};
+
+template <class Message>
+class TopicStream final : public Stream
+{
+public:
+  TopicStream(const rosbag::Bag& bag, const std::string& topic, std::function<void(const Message&)> use)
+    : use_(std::move(use)),
+      topic_(topic),
+      view_(bag,
+            [topic](const rosbag::ConnectionInfo* c) {
+              return c->topic == topic && c->datatype == ros::message_traits::datatype<Message>();
+            }),
+      at_(view_.begin())
+  {
+    load();
+  }
+
+  void take() override
+  {
+    use_(*message_);
+    ++at_;
+    load();
+  }
+
+  std::size_t size() override { return view_.size(); }
+
+private:
+  void load()
+  {
+    alive_ = at_ != view_.end();
+    if (!alive_)
+      return;
+    message_ = at_->template instantiate<Message>();
+    if (!message_)
+      throw BagError(
+          topic_ + ": its messages are of another version of slender_sim; export with the version that recorded them");
+    stamp_ = message_->header.stamp;
+  }
+
+  std::function<void(const Message&)> use_;
+  std::string topic_;
+  rosbag::View view_;
+  rosbag::View::iterator at_;
+  boost::shared_ptr<Message> message_;
+};
 
 struct BagReader::Contents
 {
@@ -65,12 +125,16 @@ struct BagReader::Contents
   void readScene(const std::string& folder);
   void openStreams();
   void findStepLength();
+  /// Adds a stream of the topic if its messages are of this type and its name is `expected`.
   template <class Message>
-  void stream(const std::string& topic, const char* type, std::function<void(const Message&)> use)
+  void stream(const rosbag::ConnectionInfo& connection, bool expected, std::function<void(const Message&)> use)
   {
-    streams.push_back(
-        std::make_unique<TopicStream<Message>>(bag, topic, std::string("slender_sim/") + type, std::move(use)));
+    if (!expected || connection.datatype != ros::message_traits::datatype<Message>())
+      return;
+    streams.push_back(std::make_unique<TopicStream<Message>>(bag, connection.topic, std::move(use)));
+    messages += streams.back()->size();
   }
+  void openStream(const rosbag::ConnectionInfo& connection, const std::string& name);
   GraspSnapshot& grasp(const std::string& name);
   void turnWrenches();
   /// Takes the step of a state of rods, threads or cloths.
@@ -203,63 +267,47 @@ void BagReader::Contents::openStreams()
   rosbag::View all(bag,
                    [this](const rosbag::ConnectionInfo* c) { return c->topic.compare(0, prefix.size(), prefix) == 0; });
   for (const rosbag::ConnectionInfo* connection : all.getConnections())
-  {
-    const std::string& topic = connection->topic;
-    const std::string name = topic.substr(prefix.size());
-    if (!seen.insert({topic, connection->datatype}).second)
-      continue;
-    const std::string type = connection->datatype.substr(connection->datatype.find('/') + 1);
-    const SceneConfig* const known = scene ? &*scene : nullptr;
-    // in scenes of several kinds each kind has its own namespace
-    const auto isState = [&](const std::string& kind, const char* its_type) {
-      return type == its_type && (name == "state" || name == kind + "/state");
-    };
-    if (isState("rods", "RodState"))
-      stream<slender_sim::RodState>(topic, "RodState", [this, known](const auto& m) {
-        takeStep(m);
-        addSnapshot(m, known, *out);
-      });
-    else if (isState("threads", "ThreadState"))
-      stream<slender_sim::ThreadState>(topic, "ThreadState", [this](const auto& m) {
-        takeStep(m);
-        addSnapshot(m, *out);
-      });
-    else if (isState("cloths", "ClothState"))
-      stream<slender_sim::ClothState>(topic, "ClothState", [this, known](const auto& m) {
-        takeStep(m);
-        addSnapshot(m, meshes, known, *out);
-      });
-    else if (name == "body_states" && type == "BodyStates")
-      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { addSnapshot(m, out->bodies); });
-    else if (name == "obstacle_states" && type == "BodyStates")
-      stream<slender_sim::BodyStates>(topic, "BodyStates", [this](const auto& m) { addSnapshot(m, out->obstacles); });
-    else if (name == "fields" && type == "Fields")
-      stream<slender_sim::Fields>(topic, "Fields", [this](const auto& m) { addSnapshot(m, *out); });
-    else if (name == "grasp_states" && type == "GraspStates")
-      stream<slender_sim::GraspStates>(topic, "GraspStates", [this](const auto& m) {
-        requireArrays(
-            m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(),
-            "grasp_states");
-        for (std::size_t g = 0; g < m.name.size(); ++g)
-          grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, recordedPose(m.pose[g])};
-      });
-    else if (name.compare(0, 7, "grasps/") == 0 && name.size() > 14 &&
-             name.compare(name.size() - 7, 7, "/wrench") == 0 && type == "WrenchStamped")
-    {
-      const std::string of = name.substr(7, name.size() - 14);
-      streams.push_back(std::make_unique<TopicStream<geometry_msgs::WrenchStamped>>(
-          bag, topic, connection->datatype, [this, of](const auto& m) {
-            grasp(of).wrench = {fromMessage(m.wrench.force), fromMessage(m.wrench.torque)};
-            if (endsWith(m.header.frame_id, "/grasps/" + of))
-              own_axes.push_back(of);
-          }));
-    }
-    else
-      continue;
-    rosbag::View view(
-        bag, [&](const rosbag::ConnectionInfo* c) { return c->topic == topic && c->datatype == connection->datatype; });
-    messages += view.size();
-  }
+    if (seen.insert({connection->topic, connection->datatype}).second)
+      openStream(*connection, connection->topic.substr(prefix.size()));
+}
+
+/// `name`: of the topic, without the prefix.
+void BagReader::Contents::openStream(const rosbag::ConnectionInfo& connection, const std::string& name)
+{
+  const SceneConfig* const known = scene ? &*scene : nullptr;
+  // in scenes of several kinds each kind has its own namespace
+  const auto isState = [&](const std::string& kind) { return name == "state" || name == kind + "/state"; };
+  stream<slender_sim::RodState>(connection, isState("rods"), [this, known](const auto& m) {
+    takeStep(m);
+    addSnapshot(m, known, *out);
+  });
+  stream<slender_sim::ThreadState>(connection, isState("threads"), [this](const auto& m) {
+    takeStep(m);
+    addSnapshot(m, *out);
+  });
+  stream<slender_sim::ClothState>(connection, isState("cloths"), [this, known](const auto& m) {
+    takeStep(m);
+    addSnapshot(m, meshes, known, *out);
+  });
+  stream<slender_sim::BodyStates>(connection, name == "body_states",
+                                  [this](const auto& m) { addSnapshot(m, out->bodies); });
+  stream<slender_sim::BodyStates>(connection, name == "obstacle_states",
+                                  [this](const auto& m) { addSnapshot(m, out->obstacles); });
+  stream<slender_sim::Fields>(connection, name == "fields", [this](const auto& m) { addSnapshot(m, *out); });
+  stream<slender_sim::GraspStates>(connection, name == "grasp_states", [this](const auto& m) {
+    requireArrays(
+        m.object.size() == m.name.size() && m.active.size() == m.name.size() && m.pose.size() == m.name.size(),
+        "grasp_states");
+    for (std::size_t g = 0; g < m.name.size(); ++g)
+      grasp(m.name[g]).held = GraspSnapshot::Held{m.object[g], m.active[g] != 0, recordedPose(m.pose[g])};
+  });
+  const bool of_grasp = name.size() > 14 && name.compare(0, 7, "grasps/") == 0 && endsWith(name, "/wrench");
+  const std::string of = of_grasp ? name.substr(7, name.size() - 14) : std::string();
+  stream<geometry_msgs::WrenchStamped>(connection, of_grasp, [this, of](const auto& m) {
+    grasp(of).wrench = {fromMessage(m.wrench.force), fromMessage(m.wrench.torque)};
+    if (endsWith(m.header.frame_id, "/grasps/" + of))
+      own_axes.push_back(of);
+  });
 }
 
 void BagReader::Contents::findStepLength()
