@@ -36,27 +36,6 @@ void GuideBuffer::join(double start)
   last_.V = Twist();
 }
 
-void GuideBuffer::forgetPlain() { plain_.X.position.setConstant(std::nan("")); }
-
-bool GuideBuffer::passesHere() const
-{
-  const Motion now = followed(query_, rate_);
-  return now.X.position == plain_.X.position && now.X.orientation.coeffs() == plain_.X.orientation.coeffs() &&
-         now.V.linear == plain_.V.linear && now.V.angular == plain_.V.angular;
-}
-
-void GuideBuffer::rejoin(double time)
-{
-  if (!passesHere())
-    blendFrom(time, last_, followed(query_ + kLimitOffset, rate_));
-}
-
-void GuideBuffer::output(double time)
-{
-  plain_ = followed(query_, rate_);
-  last_ = blended(time, plain_);
-}
-
 GraspTarget GuideBuffer::target(double time)
 {
   advance(time);
@@ -71,13 +50,7 @@ void GuideBuffer::attachAt(const Pose& X_WG)
   catchUpFrom(X_WG);
 }
 
-void GuideBuffer::catchUpFrom(const Pose& X_WG)
-{
-  last_ = {X_WG, Twist()};
-  endFade();
-  if (following_)
-    blendFrom(*last_time_, last_, followed(query_ + kLimitOffset, rate_));
-}
+void GuideBuffer::catchUpFrom(const Pose& X_WG) { standAt({X_WG, Twist()}); }
 
 void GuideBuffer::restart(const Pose& X_WG)
 {
@@ -88,43 +61,37 @@ void GuideBuffer::restart(const Pose& X_WG)
   last_ = {X_WG, Twist()};
 }
 
-GuideBuffer::Motion GuideBuffer::followed(double query, double rate) const
+void GuideBuffer::follow(double query, double rate, GraspMotion& motion) const
 {
-  Motion m;
   Twist V_WH;
   const Pose X_WH = trajectory_.evaluate(query, &V_WH);
-  m.X = X_WH * X_HG_;
-  m.V.angular = rate * V_WH.angular;
-  m.V.linear = rate * (V_WH.linear + V_WH.angular.cross(m.X.position - X_WH.position));
-  return m;
+  motion.X = X_WH * X_HG_;
+  motion.V.angular = rate * V_WH.angular;
+  motion.V.linear = rate * (V_WH.linear + V_WH.angular.cross(motion.X.position - X_WH.position));
 }
 
-GuideBuffer::Motion GuideBuffer::blended(double time, const Motion& followed) const
+void GuideBuffer::addOffset(double time, GraspMotion& motion) const
 {
-  if (!fades(time))
-    return followed;
   const Offset& o = offset_;
   const FadeWeights w = fade(time);
   const Eigen::Vector3d r = w.value * o.r + w.slope * o.r_rate, r_rate = w.value_rate * o.r + w.slope_rate * o.r_rate;
   const Eigen::Quaterniond turn = fromRotationVector(r);
-  Motion m;
-  m.X.position = followed.X.position + w.value * o.p + w.slope * o.p_rate;
-  m.V.linear = followed.V.linear + w.value_rate * o.p + w.slope_rate * o.p_rate;
-  m.X.orientation = (turn * followed.X.orientation).normalized();
-  m.V.angular = rotationRate(r) * r_rate + turn * followed.V.angular;
-  return m;
+  motion.X.position = motion.X.position + w.value * o.p + w.slope * o.p_rate;
+  motion.V.linear = motion.V.linear + w.value_rate * o.p + w.slope_rate * o.p_rate;
+  motion.X.orientation = (turn * motion.X.orientation).normalized();
+  motion.V.angular = rotationRate(r) * r_rate + turn * motion.V.angular;
 }
 
-void GuideBuffer::blendFrom(double time, const Motion& from, const Motion& to)
+void GuideBuffer::blend(double time, const GraspMotion& from, const GraspMotion& to)
 {
   const auto differ = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, double scale) {
     return (a - b).norm() > kSameMotion * (1.0 + scale);
   };
-  const auto rotated = [](const Motion& a, const Motion& b) {
+  const auto rotated = [](const GraspMotion& a, const GraspMotion& b) {
     return rotationVector(a.X.orientation * b.X.orientation.conjugate());
   };
-  const Motion expected = blended(time, to);
-  // `to` was evaluated kLimitOffset later than `from`, so the two may differ by what passes in that time.
+  GraspMotion expected = to;
+  fadeIn(time, expected);
   const double speed = (to.V.linear.norm() + to.V.angular.norm()) * kLimitOffset / kSameMotion;
   if (!differ(from.X.position, expected.X.position, speed) &&
       !differ(rotated(from, expected), Eigen::Vector3d::Zero(), speed) &&

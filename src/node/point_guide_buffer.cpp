@@ -7,6 +7,8 @@ namespace {
 
 double largest(const Eigen::Matrix3Xd& m) { return m.cols() > 0 ? m.colwise().norm().maxCoeff() : 0.0; }
 
+PointMotion standing(const Eigen::Matrix3Xd& points) { return {points, Eigen::Matrix3Xd::Zero(3, points.cols())}; }
+
 }   // namespace
 
 PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Eigen::Matrix3Xd& points)
@@ -21,15 +23,14 @@ PointGuideBuffer::PointGuideBuffer(const GuideBuffer::Options& options, const Ei
 void PointGuideBuffer::restart(const Eigen::Matrix3Xd& points)
 {
   restartStream();
-  x_ = points;
-  v_.setZero(3, points.cols());
+  last_ = standing(points);
 }
 
 bool PointGuideBuffer::push(double time, const Eigen::Matrix3Xd& points)
 {
-  if (points.cols() != x_.cols())
+  if (points.cols() != last_.x.cols())
     throw std::invalid_argument("guide: " + std::to_string(points.cols()) + " points, but the guide has " +
-                                std::to_string(x_.cols()));
+                                std::to_string(last_.x.cols()));
   if (!isNew(time))
     return false;
   if (!points.allFinite())   // refused samples must not reach the timing
@@ -38,67 +39,39 @@ bool PointGuideBuffer::push(double time, const Eigen::Matrix3Xd& points)
   return true;
 }
 
-void PointGuideBuffer::join(double) { v_.setZero(); }
-
-void PointGuideBuffer::forgetPlain() { plain_x_.resize(3, 0); }
-
-void PointGuideBuffer::output(double time)
-{
-  follow(query_, rate_, x_, v_);
-  plain_x_ = x_;
-  plain_v_ = v_;
-  addOffset(time, x_, v_);
-}
+void PointGuideBuffer::join(double) { last_.v.setZero(); }
 
 const Eigen::Matrix3Xd& PointGuideBuffer::target(double time)
 {
   advance(time);
-  return x_;
+  return last_.x;
 }
 
-void PointGuideBuffer::attachAt(const Eigen::Matrix3Xd& points)
+void PointGuideBuffer::attachAt(const Eigen::Matrix3Xd& points) { standAt(standing(points)); }
+
+void PointGuideBuffer::follow(double query, double rate, PointMotion& motion) const
 {
-  x_ = points;
-  v_.setZero(3, points.cols());
-  endFade();
-  forgetPlain();
-  if (following_)
-    rejoin(*last_time_);
+  trajectory_.evaluate(query, motion.x, &motion.v);
+  motion.v *= rate;
 }
 
-void PointGuideBuffer::follow(double query, double rate, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const
+void PointGuideBuffer::addOffset(double time, PointMotion& motion) const
 {
-  trajectory_.evaluate(query, x, &v);
-  v *= rate;
-}
-
-void PointGuideBuffer::addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const
-{
-  if (!fades(time))
-    return;
   const FadeWeights w = fade(time);
-  x += w.value * offset_ + w.slope * offset_rate_;
-  v += w.value_rate * offset_ + w.slope_rate * offset_rate_;
+  motion.x += w.value * offset_.x + w.slope * offset_.v;
+  motion.v += w.value_rate * offset_.x + w.slope_rate * offset_.v;
 }
 
-/// Starts an offset at `time` that leads from x_, v_ to the trajectory, unless the trajectory passes through them.
-void PointGuideBuffer::rejoin(double time)
+void PointGuideBuffer::blend(double time, const PointMotion& from, const PointMotion& to)
 {
-  Eigen::Matrix3Xd to, to_rate;
-  follow(query_, rate_, to, to_rate);
-  if (plain_x_.cols() == to.cols() && to == plain_x_ && to_rate == plain_v_)
-    return;   // the trajectory has not changed here
-  follow(query_ + kLimitOffset, rate_, to, to_rate);
-  // `to` was evaluated kLimitOffset later than x_, so the two may differ by what passes in that time.
-  Eigen::Matrix3Xd expected = to, expected_rate = to_rate;
-  addOffset(time, expected, expected_rate);
-  const double speed = largest(to_rate);
-  if (largest(x_ - expected) <= kSameMotion + 2.0 * speed * kLimitOffset &&
-      largest(v_ - expected_rate) < 1e-4 * (1e-2 + speed))
+  PointMotion expected = to;
+  fadeIn(time, expected);
+  const double speed = largest(to.v);
+  if (largest(from.x - expected.x) <= kSameMotion + 2.0 * speed * kLimitOffset &&
+      largest(from.v - expected.v) < 1e-4 * (1e-2 + speed))
     return;
-  offset_ = x_ - to;
-  offset_rate_ = v_ - to_rate;
-  beginFade(time, largest(offset_) / options_.catch_up_speed);
+  offset_ = {from.x - to.x, from.v - to.v};
+  beginFade(time, largest(offset_.x) / options_.catch_up_speed);
 }
 
 }   // namespace slender

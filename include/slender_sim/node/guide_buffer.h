@@ -9,6 +9,18 @@
 
 namespace slender {
 
+/// A pose and its velocity.
+struct GraspMotion
+{
+  Pose X;
+  Twist V;
+  bool operator==(const GraspMotion& other) const   // to the last bit
+  {
+    return X.position == other.X.position && X.orientation.coeffs() == other.X.orientation.coeffs() &&
+           V.linear == other.V.linear && V.angular == other.V.angular;
+  }
+};
+
 /// Turns a stream of stamped poses of one gripper into a motion of its grasp that never jumps in position or velocity.
 ///
 /// Method. Samples are joined by PoseTrajectory (C1 cubic Hermite in position and rotation vector) and evaluated at
@@ -20,7 +32,7 @@ namespace slender {
 /// and velocity between the last output and the changed trajectory then becomes an offset. A cubic Hermite polynomial
 /// takes the offset to zero within a blending time, so the grasp catches up with continuous velocity and a mean speed
 /// of about `catch_up_speed` at most. While samples come in time the offset is exactly zero.
-class GuideBuffer : public GuideStream<PoseTrajectory>
+class GuideBuffer : public GuideStream<PoseTrajectory, GraspMotion>
 {
 public:
   struct Options : GuideTiming::Options
@@ -58,32 +70,21 @@ public:
   const Pose& graspInGripper() const { return X_HG_; }
 
 private:
-  struct Motion
-  {
-    Pose X;
-    Twist V;
-  };
   struct Offset
   {
     Eigen::Vector3d p, p_rate, r, r_rate;   // position [m], rotation vector [rad], and rates, at its start
   };
 
   void join(double start) override;
-  void forgetPlain() override;
-  void rejoin(double time) override;
-  void output(double time) override;
-  bool passesHere() const;                            // the trajectory has not changed at query_, to the last bit
-  Motion followed(double query, double rate) const;   // motion of the grasp without an offset
-  Motion blended(double time, const Motion& followed) const;
-  void blendFrom(double time, const Motion& from, const Motion& to);
+  void follow(double query, double rate, GraspMotion& motion) const override;
+  void addOffset(double time, GraspMotion& motion) const override;
+  void blend(double time, const GraspMotion& from, const GraspMotion& to) override;
 
   Options options_;
   Attach attach_;
   Pose X_HG_;                        // grasp in the gripper, known once samples have taken effect
   std::optional<Pose> first_X_HG_;   // Attach::initial: the offset when the very first pose took effect
   bool held_anew_ = false;           // attachAt() was called since the start or since restart()
-  Motion plain_;                     // motion without an offset at last_time_
-  Motion last_;                      // last output
   Offset offset_;
 };
 

@@ -3,15 +3,47 @@
 #include <algorithm>
 #include <optional>
 
-#include "slender_sim/node/catch_up.h"
 #include "slender_sim/node/guide_timing.h"
 
 namespace slender {
 
+/// [s] a limit from the right is evaluated this much later; shorter than any step
+constexpr double kLimitOffset = 1e-7;
+/// [s] an extrapolated motion would come to rest in this time at a constant rate
+constexpr double kOpenCoast = 0.5;
+constexpr double kDryBlend = 0.3;       ///< [s] shortest blending time after a stream ran dry, whose offsets are small
+constexpr double kSameMotion = 1e-10;   ///< [m], [rad] round-off of evaluating the same motion twice
+
+/// Weights of an offset and of its rate at one instant: offset(t) = value * offset(0) + slope * rate(0), and the
+/// derivative of that with respect to time.
+struct FadeWeights
+{
+  double value = 0.0;        ///< [1]
+  double slope = 0.0;        ///< [s]
+  double value_rate = 0.0;   ///< [1/s]
+  double slope_rate = 0.0;   ///< [1]
+};
+
+/// Weights of the cubic Hermite polynomial that takes an offset to zero within `duration` [s] > 0 and its rate within
+/// `rate_duration` [s] > 0. The rate has a duration of its own, because a rate that fades over a long time would lead
+/// far away. `elapsed` [s] is the time since the start; outside of the durations the polynomial keeps its end values.
+inline FadeWeights fadeOut(double elapsed, double duration, double rate_duration)
+{
+  const double s = std::clamp(elapsed / duration, 0.0, 1.0);
+  const double u = std::clamp(elapsed / rate_duration, 0.0, 1.0);
+  FadeWeights weights;
+  weights.value = (1 + 2 * s) * (1 - s) * (1 - s);
+  weights.slope = rate_duration * u * (1 - u) * (1 - u);
+  weights.value_rate = 6 * s * (s - 1) / duration;
+  weights.slope_rate = (1 - u) * (1 - 3 * u);
+  return weights;
+}
+
 /// Follows a stream of stamped samples in simulated time: what GuideBuffer and PointGuideBuffer have in common.
 /// `Trajectory` joins the samples (PoseTrajectory, PointTrajectory). It is evaluated at instants that GuideTiming
-/// chooses. The derived class evaluates it and blends from the last output to a trajectory that has changed.
-template <class Trajectory>
+/// chooses. When it has changed at the last instant, an offset leads from the last output to it and fades. `Motion` is
+/// a place and its velocity; the derived class evaluates the trajectory and has the offset.
+template <class Trajectory, class Motion>
 class GuideStream
 {
 public:
@@ -46,13 +78,14 @@ protected:
 
   /// Called when the first stream takes effect. trajectory_ begins at `start` [s].
   virtual void join(double start) = 0;
-  /// Called when the last evaluated motion is no longer that of the trajectory at query_.
-  virtual void forgetPlain() = 0;
-  /// The trajectory may have changed at query_. Starts a blend from the last output, given at simulated `time` [s],
-  /// unless they agree.
-  virtual void rejoin(double time) = 0;
-  /// Sets the output at simulated `time` [s] from the trajectory at query_, which passes at rate_.
-  virtual void output(double time) = 0;
+  /// Evaluates the trajectory at an instant that passes at this rate.
+  virtual void follow(double query, double rate, Motion& motion) const = 0;
+  /// Adds the offset at simulated `time` [s] to a motion of the trajectory. Called only while there is one.
+  virtual void addOffset(double time, Motion& motion) const = 0;
+  /// Starts an offset at simulated `time` [s] that leads from `from` to `to`, unless `from` is what output() would give
+  /// for `to`. The trajectory was evaluated kLimitOffset later than `from`, so the two may differ by what passes in
+  /// that time.
+  virtual void blend(double time, const Motion& from, const Motion& to) = 0;
 
   /// Returns true if `time` [s] is later than the last sample.
   bool isNew(double time) const { return !last_stamp_ || time > *last_stamp_; }
@@ -69,7 +102,7 @@ protected:
     changed_ = true;
   }
 
-  /// Goes on to simulated `time` [s], which does not decrease from call to call. Calls output() once a stream has taken
+  /// Goes on to simulated `time` [s], which does not decrease from call to call. Sets last_ once a stream has taken
   /// effect.
   void advance(double time)
   {
@@ -114,10 +147,23 @@ protected:
     fade_rate_duration_ = timing_.overran() ? std::max(blend_, kDryBlend) : blend_;
     fade_duration_ = std::max(fade_rate_duration_, catch_up);
   }
-  void endFade() { fade_duration_ = 0.0; }
-  /// Whether there is an offset at this time.
-  bool fades(double time) const { return fade_duration_ > 0.0 && time < fade_start_ + fade_duration_; }
   FadeWeights fade(double time) const { return fadeOut(time - fade_start_, fade_duration_, fade_rate_duration_); }
+
+  /// What follows stands still there, and catches up with the stream.
+  void standAt(const Motion& place)
+  {
+    last_ = place;
+    endFade();
+    if (following_)
+      blendFromLast(*last_time_);
+  }
+
+  /// Adds the offset if there is one at simulated `time` [s].
+  void fadeIn(double time, Motion& motion) const
+  {
+    if (fade_duration_ > 0.0 && time < fade_start_ + fade_duration_)
+      addOffset(time, motion);
+  }
 
   /// Forgets all samples, and the offset.
   void restartStream()
@@ -135,8 +181,38 @@ protected:
   bool following_ = false;            // samples have taken effect
   std::optional<double> last_time_;   // [s] simulated time of the last query
   double query_ = 0.0, rate_ = 1.0;   // [s] instant of the trajectory at last_time_, and its rate
+  Motion last_;                       // last output
 
 private:
+  void endFade() { fade_duration_ = 0.0; }
+  void forgetPlain() { plain_.reset(); }
+
+  /// Sets the output at simulated `time` [s] from the trajectory at query_, which passes at rate_.
+  void output(double time)
+  {
+    if (!plain_)
+      plain_.emplace();
+    follow(query_, rate_, *plain_);
+    last_ = *plain_;
+    fadeIn(time, last_);
+  }
+
+  /// Starts a blend from the last output, given at simulated `time` [s], if the trajectory has changed at query_.
+  void rejoin(double time)
+  {
+    Motion now;
+    follow(query_, rate_, now);
+    if (!plain_ || !(now == *plain_))
+      blendFromLast(time);
+  }
+
+  void blendFromLast(double time)
+  {
+    Motion to;
+    follow(query_ + kLimitOffset, rate_, to);
+    blend(time, last_, to);
+  }
+
   /// Handles a motion that runs past its last sample and stops there. The jump in velocity becomes an offset, which is
   /// blended out.
   void halt(double time, const GuideTiming::Instant& now)
@@ -179,6 +255,7 @@ private:
   std::optional<double> last_stamp_;   // [s] of the last sample
   bool changed_ = false;               // the trajectory changed since the last query
   bool open_ = false;                  // the end of the trajectory is extrapolated
+  std::optional<Motion> plain_;        // motion without an offset at last_time_, where it is that of the trajectory
 };
 
 }   // namespace slender

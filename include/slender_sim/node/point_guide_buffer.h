@@ -7,10 +7,17 @@
 
 namespace slender {
 
+/// Positions of points and their velocities, 3 x n.
+struct PointMotion
+{
+  Eigen::Matrix3Xd x, v;
+  bool operator==(const PointMotion& other) const { return x == other.x && v == other.v; }   // to the last bit
+};
+
 /// Turns a stream of stamped guide vertices into a motion of the guide that never jumps in position or velocity. The
 /// method is that of GuideBuffer, with PointTrajectory between the samples. All points catch up within the same time,
 /// and the mean speed of catching up is about `catch_up_speed` at most.
-class PointGuideBuffer : public GuideStream<PointTrajectory>
+class PointGuideBuffer : public GuideStream<PointTrajectory, PointMotion>
 {
 public:
   /// `points` are the present positions of the guide's vertices, 3 x n [m]. The option `catch_up_turning` has no
@@ -31,16 +38,12 @@ public:
 
 private:
   void join(double start) override;
-  void forgetPlain() override;
-  void rejoin(double time) override;
-  void output(double time) override;
-  void follow(double query, double rate, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const;
-  void addOffset(double time, Eigen::Matrix3Xd& x, Eigen::Matrix3Xd& v) const;
+  void follow(double query, double rate, PointMotion& motion) const override;
+  void addOffset(double time, PointMotion& motion) const override;
+  void blend(double time, const PointMotion& from, const PointMotion& to) override;
 
   GuideBuffer::Options options_;
-  Eigen::Matrix3Xd plain_x_, plain_v_;      // motion without an offset at last_time_; empty when it is not known
-  Eigen::Matrix3Xd x_, v_;                  // last output
-  Eigen::Matrix3Xd offset_, offset_rate_;   // [m], [m/s] at the start
+  PointMotion offset_;   // at its start
 };
 
 }   // namespace slender
