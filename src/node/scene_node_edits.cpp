@@ -1,7 +1,7 @@
 // Services that change the scene while it runs.
 #include <algorithm>
-#include <array>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include <std_msgs/String.h>
@@ -14,14 +14,19 @@ namespace slender {
 namespace {
 
 using slender_sim::Input;
-using Kind = SceneEdit::Kind;
 
-/// Kinds of edits, and their numbers in the inputs of a bag.
-const std::array<std::pair<Kind, std::uint8_t>, 5> kinds{{{Kind::spawn, Input::SPAWN},
-                                                          {Kind::remove, Input::REMOVE},
-                                                          {Kind::attach, Input::ATTACH},
-                                                          {Kind::detach, Input::DETACH},
-                                                          {Kind::set_parameter, Input::SET_PARAMETER}}};
+/// The services that edit, and their numbers in the inputs of a bag.
+struct EditService
+{
+  const char* name;
+  SceneEdit::Kind kind;
+  std::uint8_t number;
+};
+constexpr EditService edit_services[] = {{"spawn", SceneEdit::Kind::spawn, Input::SPAWN},
+                                         {"remove", SceneEdit::Kind::remove, Input::REMOVE},
+                                         {"attach", SceneEdit::Kind::attach, Input::ATTACH},
+                                         {"detach", SceneEdit::Kind::detach, Input::DETACH},
+                                         {"set_parameter", SceneEdit::Kind::set_parameter, Input::SET_PARAMETER}};
 
 /// Rearranges the values of grasps for the edited scene. A grasp that still exists keeps its value.
 void takeByName(const std::vector<std::string>& before, const std::vector<std::string>& now,
@@ -48,46 +53,28 @@ std::string withoutPlace(const SceneConfig& scene, const std::string& warning)
 void SceneNode::advertiseEdits()
 {
   using slender_sim::EditScene;
-  using Callback = boost::function<bool(EditScene::Request&, EditScene::Response&)>;
-  const auto to = [this](Kind kind) -> Callback {
-    return [this, kind](EditScene::Request& request, EditScene::Response& response) {
-      return onEdit(kind, request, response);
-    };
-  };
-  services_.insert(
-      services_.end(),
-      {nh_priv_.advertiseService("spawn", to(Kind::spawn)), nh_priv_.advertiseService("remove", to(Kind::remove)),
-       nh_priv_.advertiseService("attach", to(Kind::attach)), nh_priv_.advertiseService("detach", to(Kind::detach)),
-       nh_priv_.advertiseService("set_parameter", to(Kind::set_parameter))});
+  for (const EditService& service : edit_services)
+    offer<EditScene>(service.name,
+                     [service](SceneNode* node, const EditScene::Request& request, EditScene::Response& response) {
+                       Input input = makeInput(service.number);
+                       input.text = request.text;
+                       response.message = node->edit(service.kind, std::move(input));
+                     });
 }
 
-bool SceneNode::onEdit(Kind kind, slender_sim::EditScene::Request& request, slender_sim::EditScene::Response& response)
+std::string SceneNode::edit(SceneEdit::Kind kind, Input input)
 {
-  response.success = false;
-  response.message = refusesInput();
-  if (response.message.empty() && !limits_->held().empty())
-    response.message = "inputs are held by a limit; call ~pause with false first";
-  if (response.message.empty() && mode_ == Mode::failed)
-    response.message = "stopped at " + failure_ + "; call ~reset or ~load_state first";
-  if (!response.message.empty())
-    return true;
+  requireInput();
+  if (!limits_->held().empty())
+    throw std::runtime_error("inputs are held by a limit; call ~pause with false first");
+  if (mode_ == Mode::failed)
+    throw std::runtime_error("stopped at " + failure_ + "; call ~reset or ~load_state first");
   queue_.callAvailable();   // messages that came before the edit apply to the scene before the edit
-  try
-  {
-    EditedScene scene = edited({kind, request.text});
-    response.message = scene.warnings;
-    const auto found = std::find_if(kinds.begin(), kinds.end(), [kind](const auto& k) { return k.first == kind; });
-    Input input = makeInput(found->second);
-    input.text = request.text;
-    note(std::move(input), clock_.ticks());
-    takeUp(std::move(scene));
-    response.success = true;
-  }
-  catch (const std::exception& e)
-  {
-    response.message = e.what();
-  }
-  return true;
+  EditedScene scene = edited({kind, input.text});
+  const std::string warnings = scene.warnings;
+  note(std::move(input), clock_.ticks());
+  takeUp(std::move(scene));
+  return warnings;
 }
 
 SceneNode::EditedScene SceneNode::edited(const SceneEdit& edit) const
@@ -170,9 +157,9 @@ void SceneNode::deleteMarkers(const Simulation& before)
 
 void SceneNode::repeatEdit(const Input& input)
 {
-  for (const auto& [kind, number] : kinds)
-    if (number == input.kind)
-      takeUp(edited({kind, input.text}));
+  for (const EditService& service : edit_services)
+    if (service.number == input.kind)
+      takeUp(edited({service.kind, input.text}));
 }
 
 }   // namespace slender

@@ -87,10 +87,10 @@ std::string SceneNode::leftover(const std::string& parameter) const
          ")";
 }
 
-std::string SceneNode::refusesInput() const
+void SceneNode::requireInput() const
 {
-  return replay_ ? "the node repeats the run in " + replay_->path() + " (~replay) and takes no other input"
-                 : std::string();
+  if (replay_)
+    throw std::runtime_error("the node repeats the run in " + replay_->path() + " (~replay) and takes no other input");
 }
 
 /// `tick`: when it took effect. The first one is preceded by what replaying needs to know of the parameters.
@@ -162,14 +162,10 @@ void SceneNode::repeat(const Input& input)
     case Input::SET_FUNCTIONS:
     {
       slender_sim::SetFunctions::Request request;
-      slender_sim::SetFunctions::Response response;
       request.name = input.name;
       request.set = input.text;
       request.blend = values(input, 1)[0];
-      setFunctions(request, response);
-      if (!response.success)
-        throw std::runtime_error(response.message);
-      return;
+      return setFunctions(request);
     }
     case Input::SPAWN:
     case Input::REMOVE:
@@ -238,8 +234,6 @@ void SceneNode::repeatGrasp(const Input& input)
   request.max_distance = v[6];
   request.position_only = v[7] != 0.0;
   setGrasp(request, response);
-  if (!response.success)
-    throw std::runtime_error(response.message);
 }
 
 }   // namespace slender

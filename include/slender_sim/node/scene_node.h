@@ -1,6 +1,8 @@
 #pragma once
 
 #include <atomic>
+#include <exception>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -125,21 +127,44 @@ private:
   void repeat(const slender_sim::Input& input);
   void repeatJump(const slender_sim::Input& input);
   void repeatGrasp(const slender_sim::Input& input);
-  std::string refusesInput() const;   // reason why service calls must not change the run; empty: they may
+  void requireInput() const;   // throws std::runtime_error if service calls must not change the run
+
+  /// Offers a service. act(this, request, response) does what the request asks and fills the response, or throws
+  /// std::exception with the reason why not.
+  template <class Service, class Act>
+  void offer(const std::string& name, const Act& act)
+  {
+    using Request = typename Service::Request;
+    using Response = typename Service::Response;
+    const boost::function<bool(Request&, Response&)> answer = [this, act](Request& request, Response& response) {
+      response.success = true;
+      try
+      {
+        std::invoke(act, this, request, response);
+      }
+      catch (const std::exception& e)
+      {
+        response.success = false;
+        response.message = e.what();
+      }
+      return true;
+    };
+    services_.push_back(nh_priv_.advertiseService(name, answer));
+  }
 
   // scene_node_services.cpp
   void advertiseServices();
-  bool onPause(std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
-  bool onReset(std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
-  bool onStep(slender_sim::Step::Request& request, slender_sim::Step::Response& response);
-  bool onSetGrasp(slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
-  bool onSetFunctions(slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
-  bool onSave(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
-  bool onLoad(slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
+  void onPause(const std_srvs::SetBool::Request& request, std_srvs::SetBool::Response& response);
+  void onReset(const std_srvs::Trigger::Request& request, std_srvs::Trigger::Response& response);
+  void onStep(const slender_sim::Step::Request& request, slender_sim::Step::Response& response);
+  void onSetGrasp(const slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
+  void onSetFunctions(const slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
+  void onSave(const slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
+  void onLoad(const slender_sim::FilePath::Request& request, slender_sim::FilePath::Response& response);
+  // These throw std::exception with the reason why not.
   void setGrasp(const slender_sim::SetGrasp::Request& request, slender_sim::SetGrasp::Response& response);
-  void setFunctions(const slender_sim::SetFunctions::Request& request, slender_sim::SetFunctions::Response& response);
-  std::string attach(const slender_sim::SetGrasp::Request& request, int grasp,
-                     slender_sim::SetGrasp::Response& response);
+  void setFunctions(const slender_sim::SetFunctions::Request& request);
+  void attach(const slender_sim::SetGrasp::Request& request, int grasp, slender_sim::SetGrasp::Response& response);
 
   // scene_node_edits.cpp
   struct EditedScene
@@ -149,9 +174,8 @@ private:
     std::string warnings;
   };
   void advertiseEdits();
-  bool onEdit(SceneEdit::Kind kind, slender_sim::EditScene::Request& request,
-              slender_sim::EditScene::Response& response);
-  EditedScene edited(const SceneEdit& edit) const;   // throws if the edit is refused
+  std::string edit(SceneEdit::Kind kind, slender_sim::Input input);   // returns the new warnings
+  EditedScene edited(const SceneEdit& edit) const;                    // throws if the edit is refused
   void takeUp(EditedScene edited);
   void deleteMarkers(const Simulation& before);
   void repeatEdit(const slender_sim::Input& input);
