@@ -115,7 +115,7 @@ StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInput
     if (total.ok)
       total.merge(cloth.solveEquilibrium(state, inputs));
   if (total.ok && !(objects_.rods.empty() && objects_.bodies.empty()))
-    total.merge(solveStatics(objects_, loop_.threads, state, inputs));
+    total.merge(solveStatics(objects_, threads_, state, inputs));
   return total;
 }
 

@@ -1,12 +1,12 @@
 #pragma once
 
+#include <exception>
 #include <map>
 #include <vector>
 
 #include "island_finder.h"
 #include "object_island.h"
 #include "world_objects.h"
-#include "group_loop.h"
 
 namespace slender {
 
@@ -35,7 +35,7 @@ public:
   void addContacts(ContactLoads& out) const;
   /// The state is another one: there was no last step.
   void forgetContacts();
-  void setThreads(int threads) { loop_.threads = threads; }
+  void setThreads(int threads) { threads_ = threads; }
   /// Throws std::invalid_argument where cloths that collide by impulses cross something.
   void checkCloths(const WorldState& state);
 
@@ -69,7 +69,9 @@ private:
   std::map<std::vector<int>, ObjectIsland> known_;   ///< islands that have been needed, by the places of their objects
   std::vector<ObjectIsland*> islands_;               ///< of the present step
   std::vector<int> places_;                          ///< objects of one island
-  GroupLoop loop_;
+  int threads_ = 0;                                  ///< that are used; 0: see parallelFor()
+  std::vector<StepReport> reports_;                  ///< of the islands that step in parallel, and
+  std::vector<std::exception_ptr> errors_;           ///< what they throw
 };
 
 }   // namespace slender

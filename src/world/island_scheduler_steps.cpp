@@ -4,6 +4,7 @@
 
 #include "contact/contact_potential.h"
 #include "island_scheduler.h"
+#include "linalg/parallel_for.h"
 #include "meeting.h"
 #include "slender_sim/contact/solids.h"
 
@@ -88,7 +89,8 @@ void IslandScheduler::arrange(WorldState& state, const WorldInputs& inputs)
   }
 }
 
-/// Large islands one after the other, each on all threads, then the others in parallel.
+/// Large islands one after the other, each on all threads, then the others in parallel. Throws what one of these
+/// throws, after all of them.
 StepReport IslandScheduler::stepIslands()
 {
   StepReport total;
@@ -97,13 +99,30 @@ StepReport IslandScheduler::stepIslands()
   };
   for (ObjectIsland* island : islands_)
   {
-    island->setThreads(island->isLarge() ? loop_.threads : 1);
+    island->setThreads(island->isLarge() ? threads_ : 1);
     if (island->isLarge() && total.ok)
       total.merge(step(*island));
   }
-  if (total.ok)
-    loop_.run(
-        static_cast<int>(islands_.size()), nodes_, [&](int k) { return step(*islands_[k]); }, total);
+  if (!total.ok)
+    return total;
+  constexpr int kWorthThreads = 500;   // nodes; a smaller step is faster on one thread than starting threads is
+  reports_.resize(islands_.size());
+  errors_.assign(islands_.size(), nullptr);
+  parallelFor(nodes_ < kWorthThreads ? 1 : threads_, static_cast<int>(islands_.size()), 1, [&](int k) {
+    try
+    {
+      reports_[k] = step(*islands_[k]);
+    }
+    catch (...)
+    {
+      errors_[k] = std::current_exception();
+    }
+  });
+  for (const std::exception_ptr& error : errors_)
+    if (error)
+      std::rethrow_exception(error);
+  for (const StepReport& report : reports_)
+    total.merge(report);
   return total;
 }
 
