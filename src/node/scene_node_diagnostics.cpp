@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <type_traits>
 
 #include <diagnostic_msgs/DiagnosticStatus.h>
 
@@ -12,6 +11,7 @@ namespace slender {
 namespace {
 
 using diagnostic_msgs::DiagnosticStatus;
+using diagnostic_updater::DiagnosticStatusWrapper;
 
 constexpr double kBehind = 1.0;   // [s] /clock may lag behind the simulated time by a few resets' ticks
 
@@ -22,22 +22,7 @@ std::string text(const char* format, double value)
   return out;
 }
 
-/// `value` is a text or a number.
-template <class Value>
-void add(DiagnosticStatus& status, const std::string& key, const Value& value)
-{
-  diagnostic_msgs::KeyValue entry;
-  entry.key = key;
-  if constexpr (std::is_integral_v<Value>)
-    entry.value = std::to_string(value);
-  else if constexpr (std::is_floating_point_v<Value>)
-    entry.value = text("%.6g", value);
-  else
-    entry.value = value;
-  status.values.push_back(entry);
-}
-
-void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& message)
+void raise(DiagnosticStatusWrapper& status, std::uint8_t level, const std::string& message)
 {
   if (level < status.level)
     return;
@@ -45,7 +30,7 @@ void raise(DiagnosticStatus& status, std::uint8_t level, const std::string& mess
   status.level = level;
 }
 
-void addThreads(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
+void addThreads(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatusWrapper& status)
 {
   std::uint64_t nodes = 0, pieces = 0;
   ThreadVolumes volumes;
@@ -58,47 +43,47 @@ void addThreads(const Simulation& simulation, const RunStatistics& recent, Diagn
       ++pieces;
     }
   }
-  add(status, "nodes", nodes);
-  add(status, "threads and pieces", pieces);
-  add(status, "fed volume [m^3]", volumes.fed);
-  add(status, "volume in the scene [m^3]", volumes.present);
-  add(status, "volume that left the region [m^3]", volumes.left);
-  add(status, "volume dropped by edges.deposited [m^3]", volumes.dropped);
+  status.add("nodes", nodes);
+  status.add("threads and pieces", pieces);
+  status.add("fed volume [m^3]", volumes.fed);
+  status.add("volume in the scene [m^3]", volumes.present);
+  status.add("volume that left the region [m^3]", volumes.left);
+  status.add("volume dropped by edges.deposited [m^3]", volumes.dropped);
   if (std::abs(volumes.missing()) > ThreadVolumes::kMostMissing)
     raise(status, DiagnosticStatus::ERROR, "fluid is missing: a defect of the program");
-  add(status, "mended folds", recent.mended_folds);
+  status.add("mended folds", recent.mended_folds);
 }
 
 /// Of tracked cloths with several sets.
-void addFunctions(const Simulation& simulation, const GuideRef& guide, DiagnosticStatus& status)
+void addFunctions(const Simulation& simulation, const GuideRef& guide, DiagnosticStatusWrapper& status)
 {
   if (guide.tracking->sets.size() < 2)
     return;
   const FunctionBlend& blend = simulation.state().guide(guide.object).blend;
   const double time = simulation.state().time;
-  add(status, "test functions of " + guide.name, simulation.functions(guide.object).name);
-  add(status, "blend of " + guide.name + " goes on for [s]",
-      blend.active(time) ? blend.start + blend.duration - time : 0.0);
-  add(status, "blend of " + guide.name + " leaves at most [m]", blend.left(time));
+  status.add("test functions of " + guide.name, simulation.functions(guide.object).name);
+  status.add("blend of " + guide.name + " goes on for [s]",
+             blend.active(time) ? blend.start + blend.duration - time : 0.0);
+  status.add("blend of " + guide.name + " leaves at most [m]", blend.left(time));
 }
 
 /// How a run that begins in equilibrium began.
-void addStart(const Simulation& simulation, DiagnosticStatus& status)
+void addStart(const Simulation& simulation, DiagnosticStatusWrapper& status)
 {
   if (const auto& start = simulation.startReport())
   {
-    add(status, "start: residual", start->residual);
-    add(status, "start: energy [J]", start->energy);
-    add(status, "start: lowest eigenvalue [1/s^2]", start->lowest_eigenvalue);
-    add(status, "start: stable", start->stable ? "yes" : "no");
-    add(status, "start: unstable equilibria left", start->escapes);
+    status.add("start: residual", start->residual);
+    status.add("start: energy [J]", start->energy);
+    status.add("start: lowest eigenvalue [1/s^2]", start->lowest_eigenvalue);
+    status.add("start: stable", start->stable ? "yes" : "no");
+    status.add("start: unstable equilibria left", start->escapes);
     if (!start->stable)
       raise(status, DiagnosticStatus::WARN, "the run started from an unstable equilibrium");
   }
 }
 
 /// How far shells and rods are from what they track.
-void addTracking(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
+void addTracking(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatusWrapper& status)
 {
   double error = 0.0, force = 0.0, refused = 0.0;
   bool bounded = false;
@@ -110,31 +95,31 @@ void addTracking(const Simulation& simulation, const RunStatistics& recent, Diag
     force = std::max(force, simulation.state().guide(guide.object).forces.colwise().norm().maxCoeff());
     bounded = bounded || guide.tracking->sets[0].bounds.size() > 0;
   }
-  add(status, "constraint residual [m]", error);
-  add(status, "worst constraint residual over size", recent.tracking_error);
-  add(status, "largest guide force [N]", force);
+  status.add("constraint residual [m]", error);
+  status.add("worst constraint residual over size", recent.tracking_error);
+  status.add("largest guide force [N]", force);
   for (const GuideRef& guide : simulation.guides())
     addFunctions(simulation, guide, status);
   if (bounded)
   {
-    add(status, "most guide forces at their bounds", recent.forces_at_bound);
-    add(status, "greatest distance where forces are at their bounds [m]", refused);
+    status.add("most guide forces at their bounds", recent.forces_at_bound);
+    status.add("greatest distance where forces are at their bounds [m]", refused);
   }
 }
 
-void addCloths(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatus& status)
+void addCloths(const Simulation& simulation, const RunStatistics& recent, DiagnosticStatusWrapper& status)
 {
   std::uint64_t vertices = 0;
   for (const ClothState& cloth : simulation.state().cloths)
     vertices += static_cast<std::uint64_t>(cloth.x.cols());
-  add(status, "vertices", vertices);
+  status.add("vertices", vertices);
   const auto& cloths = simulation.config().cloths;
   if (std::any_of(cloths.begin(), cloths.end(), [](const ClothConfig& cloth) { return cloth.contact.has_value(); }))
   {
-    add(status, "contacts per step",
-        recent.steps ? static_cast<double>(recent.repulsions) / static_cast<double>(recent.steps) : 0.0);
-    add(status, "collisions stopped", recent.impulses);
-    add(status, "rigid pieces", recent.zones);
+    status.add("contacts per step",
+               recent.steps ? static_cast<double>(recent.repulsions) / static_cast<double>(recent.steps) : 0.0);
+    status.add("collisions stopped", recent.impulses);
+    status.add("rigid pieces", recent.zones);
   }
 }
 
@@ -226,33 +211,30 @@ std::string SceneNode::clockWentBack() const
                           : "";
 }
 
-void SceneNode::addLimits(DiagnosticStatus& status) const
+void SceneNode::addLimits(DiagnosticStatusWrapper& status) const
 {
-  const auto report = [&status](std::uint8_t level, const std::string& message) {
-    status.message += (status.message.empty() ? "" : "; ") + message;
-    if (level > status.level)
-      status.level = level;
-  };
   const std::vector<std::string> lasting = limits_->lasting();
   if (!limits_->held().empty())
-    report(DiagnosticStatus::ERROR, "inputs are held (call ~pause with false to let them go on): " + limits_->held());
+    status.mergeSummary(DiagnosticStatus::ERROR,
+                        "inputs are held (call ~pause with false to let them go on): " + limits_->held());
   else if (!lasting.empty())
-    report(DiagnosticStatus::WARN,
-           lasting.front() + (lasting.size() > 1 ? " and " + std::to_string(lasting.size() - 1) + " more limits" : ""));
+    status.mergeSummary(
+        DiagnosticStatus::WARN,
+        lasting.front() + (lasting.size() > 1 ? " and " + std::to_string(lasting.size() - 1) + " more limits" : ""));
   const std::vector<std::string>& inside = crossings_->heldInside();
   if (!inside.empty())
-    report(DiagnosticStatus::WARN, inside.front());
+    status.mergeSummary(DiagnosticStatus::WARN, inside.front());
   for (const std::string& pair : inside)
-    add(status, "held inside", pair);
-  add(status, "limits exceeded now", lasting.size());
-  add(status, "limits exceeded so far", limits_->count());
+    status.add("held inside", pair);
+  status.add("limits exceeded now", lasting.size());
+  status.add("limits exceeded so far", limits_->count());
   if (!lasting.empty())
-    add(status, "last limit exceeded", lasting.back());
+    status.add("last limit exceeded", lasting.back());
 }
 
-DiagnosticStatus SceneNode::simulationStatus() const
+DiagnosticStatusWrapper SceneNode::simulationStatus() const
 {
-  DiagnosticStatus status;
+  DiagnosticStatusWrapper status;
   status.name = nh_priv_.getNamespace() + ": simulation";
   status.hardware_id = simulation_->config().name;
   status.level = DiagnosticStatus::OK;
@@ -276,59 +258,59 @@ DiagnosticStatus SceneNode::simulationStatus() const
   if (status.message.empty())
     status.message = mode_ == Mode::paused ? "paused" : running ? "running" : "waiting for ~step";
 
-  add(status, "epoch", epoch_);
-  add(status, "step", simulation_->state().steps);
-  add(status, "simulated time [s]", simulation_->state().time);
-  add(status, "mean step time [ms]", recent_.steps ? 1e3 * recent_.busy / static_cast<double>(recent_.steps) : 0.0);
-  add(status, "longest step time [ms]", 1e3 * recent_.worst_step);
-  add(status, "real-time factor", recent_.realTimeFactor());
-  add(status, "simulated per wall second", achieved);
+  status.add("epoch", epoch_);
+  status.add("step", simulation_->state().steps);
+  status.add("simulated time [s]", simulation_->state().time);
+  status.add("mean step time [ms]", recent_.steps ? 1e3 * recent_.busy / static_cast<double>(recent_.steps) : 0.0);
+  status.add("longest step time [ms]", 1e3 * recent_.worst_step);
+  status.add("real-time factor", recent_.realTimeFactor());
+  status.add("simulated per wall second", achieved);
   if (options_.pace == Pace::wall || options_.pace == Pace::follow)
   {
-    add(status, "lag of stamps [s]", total_.stamp_lag);
-    add(status, "largest lag of stamps [s]", recent_.worst_stamp_lag);
+    status.add("lag of stamps [s]", total_.stamp_lag);
+    status.add("largest lag of stamps [s]", recent_.worst_stamp_lag);
   }
   if (options_.pace == Pace::wall)
-    add(status, "clock skipped [s]", total_.skipped);
-  add(status, "iterations per step",
-      recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
-  add(status, "cut steps", recent_.cut_steps);
-  add(status, "residual", recent_.residual);
-  add(status, "largest strain", recent_.max_strain);
+    status.add("clock skipped [s]", total_.skipped);
+  status.add("iterations per step",
+             recent_.steps ? static_cast<double>(recent_.iterations) / static_cast<double>(recent_.steps) : 0.0);
+  status.add("cut steps", recent_.cut_steps);
+  status.add("residual", recent_.residual);
+  status.add("largest strain", recent_.max_strain);
   addStart(*simulation_, status);
   if (topics_->has_threads)
     addThreads(*simulation_, recent_, status);
   if (recent_.projection_iterations > 0)
   {
-    add(status, "projection iterations", recent_.projection_iterations);
-    add(status, "constraint error", recent_.constraint_error);
+    status.add("projection iterations", recent_.projection_iterations);
+    status.add("constraint error", recent_.constraint_error);
   }
   if (!simulation_->guides().empty())
     addTracking(*simulation_, recent_, status);
   if (topics_->has_cloths)
     addCloths(*simulation_, recent_, status);
   if (topics_->has_rods || topics_->has_cloths)   // viscous threads keep no energy
-    add(status, "energy [J]", energyOf(*simulation_));
-  add(status, "recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
+    status.add("energy [J]", energyOf(*simulation_));
+  status.add("recording", bag_ ? bag_->path() : bag_failure_.empty() ? std::string("no") : "stopped: " + bag_failure_);
   return status;
 }
 
-DiagnosticStatus SceneNode::inputStatus()
+DiagnosticStatusWrapper SceneNode::inputStatus()
 {
-  DiagnosticStatus status;
+  DiagnosticStatusWrapper status;
   status.name = nh_priv_.getNamespace() + ": inputs";
   status.hardware_id = simulation_->config().name;
   status.level = DiagnosticStatus::OK;
   for (const GuideInputs::Age& age : inputs_->ages())
   {
     if (age.seconds)
-      add(status, "input age " + age.name + " [s]", *age.seconds);
+      status.add("input age " + age.name + " [s]", *age.seconds);
     else
-      add(status, "input age " + age.name + " [s]", "none yet");
+      status.add("input age " + age.name + " [s]", "none yet");
     if (age.seconds && *age.seconds > options_.guide_timeout && mode_ == Mode::running)
       raise(status, DiagnosticStatus::WARN, "no input for " + age.name);
     if (age.seconds)
-      add(status, "input lag " + age.name + " [s]", age.lag);
+      status.add("input lag " + age.name + " [s]", age.lag);
     if (age.seconds && age.late() > 0.0 && *age.seconds <= options_.guide_timeout)
       raise(status, DiagnosticStatus::WARN,
             "guides arrive " + text("%.0f ms later than ~guide_delay", 1e3 * age.late()) + " allows: " + age.name +
@@ -340,22 +322,22 @@ DiagnosticStatus SceneNode::inputStatus()
   }
   for (const TfInputs::State& frame : inputs_->frames())
     if (!frame.why.empty())
-      add(status, "tf " + frame.frame, frame.why);
+      status.add("tf " + frame.frame, frame.why);
   const std::vector<GuideInputs::Setting> settings = inputs_->settings();
   for (const GuideInputs::Setting& setting : settings)
-    add(status, setting.name, setting.value);
+    status.add(setting.name, setting.value);
   const DropCounter& drops = inputs_->drops();
   if (drops.total() > reported_drops_)
     raise(status, DiagnosticStatus::WARN, "messages were dropped");
   reported_drops_ = drops.total();
-  add(status, "received", drops.received());
-  add(status, "dropped", drops.total());
+  status.add("received", drops.received());
+  status.add("dropped", drops.total());
   for (int r = 0; r < kDropReasons; ++r)
   {
     const Drop reason = static_cast<Drop>(r);
-    add(status, std::string("dropped ") + toString(reason), drops.count(reason));
+    status.add(std::string("dropped ") + toString(reason), drops.count(reason));
     if (!drops.last(reason).empty())
-      add(status, std::string("last dropped ") + toString(reason), drops.last(reason));
+      status.add(std::string("last dropped ") + toString(reason), drops.last(reason));
   }
   if (status.message.empty())
     status.message = inputs_->ages().empty() && settings.empty() ? "nothing is driven from outside" : "ok";

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
 #include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/PointCloud2.h>
@@ -186,9 +187,9 @@ private:
   std::string clockWentBack() const;               ///< message if /clock went back; otherwise empty
   std::string paceNote() const;                    ///< line of the legend: how much slower than real time
   void remindOfInputs();                           ///< warns of bodies and frames without a first pose
-  void addLimits(diagnostic_msgs::DiagnosticStatus& status) const;
-  diagnostic_msgs::DiagnosticStatus simulationStatus() const;
-  diagnostic_msgs::DiagnosticStatus inputStatus();
+  void addLimits(diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  diagnostic_updater::DiagnosticStatusWrapper simulationStatus() const;
+  diagnostic_updater::DiagnosticStatusWrapper inputStatus();
 
   // messages; service calls. A long ~step answers service calls and leaves messages for later.
   ros::CallbackQueue queue_, services_queue_;
