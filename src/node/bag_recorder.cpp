@@ -10,16 +10,15 @@
 #include <std_msgs/String.h>
 
 #include "slender_sim/node/bag_paths.h"
-#include "slender_sim/node/scene_topics.h"
 #include "slender_sim/node/sim_clock.h"
 #include "slender_sim/scene/file_paths.h"
 
 namespace slender {
 
 BagRecorder::BagRecorder(const std::string& path, const std::string& topic_namespace, const Simulation& simulation)
-  : prefix_(topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace)
+  : prefix_(topic_namespace.empty() || topic_namespace.back() != '/' ? topic_namespace + "/" : topic_namespace),
+    topics_(simulation)
 {
-  nameTopics(simulation);
   for (const std::string& read : simulation.config().guide_bags)
     requireOtherBag(path, read, "a guide of the scene");
   try
@@ -36,21 +35,6 @@ BagRecorder::BagRecorder(const std::string& path, const std::string& topic_names
     throw std::runtime_error("bag " + path + ": cannot be written: " + e.what());
   }
   open_ = true;
-}
-
-void BagRecorder::nameTopics(const Simulation& simulation)
-{
-  const SceneTopics topics(simulation);
-  rods_topic_ = topics.rods + "state";
-  threads_topic_ = topics.threads + "state";
-  cloths_topic_ = topics.cloths + "state";
-  mesh_topic_ = topics.cloths + "mesh";
-  wrench_topics_.clear();
-  nozzle_topics_.clear();
-  for (const std::string& name : topics.grasps)
-    wrench_topics_.push_back("grasps/" + name + "/wrench");
-  for (const std::string& nozzle : topics.nozzles)
-    nozzle_topics_.push_back(nozzle + "nozzle/wrench");
 }
 
 BagRecorder::~BagRecorder()
@@ -107,24 +91,27 @@ void BagRecorder::recordScene(const std::string& yaml, const ros::Time& stamp)
   write("scene", stamp, message);
 }
 
-void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh) { write(mesh_topic_, mesh.header.stamp, mesh); }
+void BagRecorder::recordMesh(const slender_sim::MeshStamped& mesh)
+{
+  write(topics_.cloths + "mesh", mesh.header.stamp, mesh);
+}
 
 void BagRecorder::recordInput(const slender_sim::Input& input) { write("inputs", input.header.stamp, input); }
 
 void BagRecorder::record(const SceneMessages& messages)
 {
   for (const auto& state : messages.states)
-    write(rods_topic_, state->header.stamp, *state);
+    write(topics_.rods + "state", state->header.stamp, *state);
   for (const auto& state : messages.threads)
-    write(threads_topic_, state->header.stamp, *state);
+    write(topics_.threads + "state", state->header.stamp, *state);
   if (!messages.cloth_state->names.empty())
-    write(cloths_topic_, messages.cloth_state->header.stamp, *messages.cloth_state);
+    write(topics_.cloths + "state", messages.cloth_state->header.stamp, *messages.cloth_state);
   for (std::size_t g = 0; g < messages.wrenches.size(); ++g)
-    write(wrench_topics_[g], messages.wrenches[g].header.stamp, messages.wrenches[g]);
+    write("grasps/" + topics_.grasps[g] + "/wrench", messages.wrenches[g].header.stamp, messages.wrenches[g]);
   if (!messages.bodies.name.empty())
     write("body_states", messages.bodies.header.stamp, messages.bodies);
   for (std::size_t k = 0; k < messages.nozzles.size(); ++k)
-    write(nozzle_topics_[k], messages.nozzles[k].header.stamp, messages.nozzles[k]);
+    write(topics_.nozzles[k] + "nozzle/wrench", messages.nozzles[k].header.stamp, messages.nozzles[k]);
   if (!messages.grasps.name.empty())
     write("grasp_states", messages.grasps.header.stamp, messages.grasps);
   if (!messages.obstacles.name.empty())

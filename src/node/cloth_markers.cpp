@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include "marker_tools.h"
+#include "slender_sim/geometry/mesh_offsets.h"
 #include "slender_sim/node/converters.h"
 #include "slender_sim/node/scene_markers.h"
 #include "slender_sim/tracking/function_colors.h"
@@ -37,22 +38,14 @@ std_msgs::ColorRGBA shaded(const std_msgs::ColorRGBA& paint, const Vector3d& nor
 void addTriangles(const Eigen::Matrix3Xi& triangles, const Eigen::Matrix3Xd& x, const std_msgs::ColorRGBA& paint,
                   const Eigen::Matrix3Xd& paints, Marker& marker)
 {
-  Eigen::Matrix3Xd normals = Eigen::Matrix3Xd::Zero(3, x.cols());   // weighted by area
-  for (Eigen::Index f = 0; f < triangles.cols(); ++f)
-  {
-    const Vector3d a = x.col(triangles(0, f)), b = x.col(triangles(1, f)), c = x.col(triangles(2, f));
-    const Vector3d normal = (b - a).cross(c - a);
-    for (int corner = 0; corner < 3; ++corner)
-      normals.col(triangles(corner, f)) += normal;
-  }
+  const Eigen::Matrix3Xd normals = vertexNormals({x, triangles});
   std::vector<geometry_msgs::Point> points(static_cast<std::size_t>(x.cols()));
   std::vector<std_msgs::ColorRGBA> colors(points.size());
   for (Eigen::Index i = 0; i < x.cols(); ++i)
   {
     points[i] = toPoint(x.col(i));
-    const double length = normals.col(i).norm();
     colors[i] = shaded(paints.cols() ? color(paints(0, i), paints(1, i), paints(2, i)) : paint,
-                       length > 0.0 ? Vector3d(normals.col(i) / length) : Vector3d::UnitZ());
+                       normals.col(i).isZero(0.0) ? Vector3d::UnitZ() : Vector3d(normals.col(i)));
   }
   marker.points.reserve(static_cast<std::size_t>(triangles.size()));
   marker.colors.reserve(static_cast<std::size_t>(triangles.size()));

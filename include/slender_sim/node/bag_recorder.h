@@ -6,6 +6,7 @@
 
 #include "slender_sim/Input.h"
 #include "slender_sim/node/scene_messages.h"
+#include "slender_sim/node/scene_topics.h"
 #include "slender_sim/scene/recorder.h"
 
 namespace rosbag {
@@ -31,7 +32,7 @@ public:
   /// Records the undeformed cloths on the topic `mesh`. Call it before the first record() if the scene has cloths.
   void recordMesh(const slender_sim::MeshStamped& mesh);
   /// Records the edited scene from now on. Call recordScene(), and recordMesh() if it has cloths, before record().
-  void sceneChanged(const Simulation& simulation) { nameTopics(simulation); }
+  void sceneChanged(const Simulation& simulation) { topics_ = SceneTopics(simulation); }
   /// Records an input that changes the run, on the topic `inputs`.
   void recordInput(const slender_sim::Input& input);
   /// `state` per rod (of all cloths one), then `grasps/NAME/wrench` per grasp, then `body_states` if there are bodies,
@@ -50,11 +51,11 @@ private:
   template <class Message>
   void write(const std::string& topic, const ros::Time& stamp, const Message& message);
   std::string remains() const;
-  void nameTopics(const Simulation& simulation);
 
   const std::string prefix_;
-  std::string path_, rods_topic_, threads_topic_, cloths_topic_, mesh_topic_;
-  std::vector<std::string> wrench_topics_, nozzle_topics_, notes_;
+  SceneTopics topics_;
+  std::string path_;
+  std::vector<std::string> notes_;
   std::unique_ptr<rosbag::Bag> bag_;
   bool open_ = false;
 };
