@@ -53,7 +53,7 @@ set(CPACK_DEBIAN_SIMULATION_PACKAGE_DEPENDS
   "slender-sim-msgs (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}), rosbash, python3-roslaunch, python3-rosbag, python3-rosmsg, python3-rospy, python3-rosservice, python3-rostopic, libnodeletlib-tools")
 set(CPACK_DEBIAN_SIMULATION_PACKAGE_RECOMMENDS "rviz, ffmpeg")
 set(CPACK_DEBIAN_SIMULATION_PACKAGE_SUGGESTS
-  "libdiagnostic-aggregator-tools, libdiagnostic-aggregator-dev, libeigen3-dev, libdiagnostic-msgs-dev, libinteractive-markers-dev, librosbag-dev, libroscpp-dev, libsensor-msgs-dev, libstd-srvs-dev, libtf2-ros-dev, libvisualization-msgs-dev, gnuplot-nox, parallel")
+  "libdiagnostic-aggregator-tools, libdiagnostic-aggregator-dev, libeigen3-dev, libdiagnostic-msgs-dev, libdiagnostic-updater-dev, libinteractive-markers-dev, librosbag-dev, libroscpp-dev, libsensor-msgs-dev, libstd-srvs-dev, libtf2-ros-dev, libvisualization-msgs-dev, gnuplot-nox, parallel")
 
 include(CPack)
 cpack_add_component_group(simulation)

@@ -9,9 +9,10 @@
 
 namespace slender {
 
-/// Lawson's flips of the edges between two faces, until no edge a-b with the face of c left of it and that of d right
-/// of it is left for which wanted(a, b, c, d) is true. Flips of curved meshes may run in circles, so each edge gets a
-/// few dozen turns at most; on the way to a Delaunay mesh it needs a few.
+/// Replaces edges between two faces by the other diagonal of these faces [Lawson's flips]. The edge a-b has the face of
+/// c on its left and that of d on its right. It is replaced if wanted(a, b, c, d) is true and the edge c-d does not
+/// exist yet. The function ends when no such edge is left, or after fifty turns per edge of the mesh, because flips of
+/// curved meshes may run in circles. A Delaunay mesh takes a few turns per edge.
 template <class Wanted>
 void flipEdges(std::vector<Eigen::Vector3i>& faces, const Wanted& wanted)
 {

@@ -125,7 +125,7 @@ struct BagReader::Contents
   void readScene(const std::string& folder);
   void openStreams();
   void findStepLength();
-  /// Adds a stream of the topic if its messages are of this type and its name is `expected`.
+  /// Adds a stream of the topic if its messages are of this type and `expected` tells that its name is right.
   template <class Message>
   void stream(const rosbag::ConnectionInfo& connection, bool expected, std::function<void(const Message&)> use)
   {
@@ -271,7 +271,7 @@ void BagReader::Contents::openStreams()
       openStream(*connection, connection->topic.substr(prefix.size()));
 }
 
-/// `name`: of the topic, without the prefix.
+/// `name` is that of the topic, without the prefix.
 void BagReader::Contents::openStream(const rosbag::ConnectionInfo& connection, const std::string& name)
 {
   const SceneConfig* const known = scene ? &*scene : nullptr;

@@ -21,6 +21,15 @@ std::string wholePath(const std::string& path)
   return error || path.empty() ? path : whole.lexically_normal().string();
 }
 
+/// The flag is true for as long as this object exists.
+struct Raised
+{
+  explicit Raised(bool& the_flag) : flag(the_flag) { flag = true; }
+  Raised(const Raised&) = delete;
+  ~Raised() { flag = false; }
+  bool& flag;
+};
+
 }   // namespace
 
 void SceneNode::advertiseServices()
@@ -87,7 +96,7 @@ void SceneNode::onStep(const slender_sim::Step::Request& request, slender_sim::S
   queue_.callAvailable();   // what came before counts, what comes meanwhile does not
   inputs_->processPending();
   inputs_->takeKept(false);
-  stepping_ = true;
+  const Raised stepping(stepping_);
   step_ended_.clear();
   ros::WallTime looked = ros::WallTime::now();
   std::uint32_t done = 0;
@@ -101,7 +110,6 @@ void SceneNode::onStep(const slender_sim::Step::Request& request, slender_sim::S
       continue;
     looked = ros::WallTime::now();
   }
-  stepping_ = false;
   tellPlace();
   if (done < request.n)
     throw std::runtime_error("took " + std::to_string(done) + " of " + std::to_string(request.n) + " steps; " +

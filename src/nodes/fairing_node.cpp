@@ -84,7 +84,7 @@ int main(int argc, char** argv)
 {
   return slender::nodeMain(argc, argv, "fairing_node", [] {
     ros::NodeHandle nh_priv("~");
-    slender::ParamReader(nh_priv).refuseUnknown();   // there are none
+    slender::ParamReader(nh_priv).refuseUnknown();   // The node has no parameters.
     const ros::ServiceServer server = nh_priv.advertiseService("fair_mesh", &slender::fair);
     ros::spin();
     return 0;

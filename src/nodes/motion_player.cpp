@@ -18,9 +18,9 @@
 /// motion_player plays a table of timed poses (scene/pose_file.h) as a tracker or motion capture system would send
 /// them.
 ///
-/// Publishes each body of the table as a tf frame BODY in ~frame_id, and for each entry `BODY: GRASP` of ~bodies a
-/// PoseStamped on `grasps/GRASP/pose`, in the frame BODY itself (its pose there is the identity), so that the receiver
-/// has to ask tf.
+/// The node publishes each body of the table as a tf frame BODY in ~frame_id, and for each entry `BODY: GRASP` of
+/// ~bodies a PoseStamped on `grasps/GRASP/pose`, in the frame BODY itself (its pose there is the identity), so that the
+/// receiver has to ask tf.
 ///
 /// Bodies that ~solids lists go into `bodies` messages, in ~frame_id: those that move obstacles and driven bodies of a
 /// scene.

@@ -69,9 +69,9 @@ private:
   std::map<std::vector<int>, ObjectIsland> known_;   ///< islands that have been needed, by the places of their objects
   std::vector<ObjectIsland*> islands_;               ///< of the present step
   std::vector<int> places_;                          ///< objects of one island
-  int threads_ = 0;                                  ///< that are used; 0: see parallelFor()
-  std::vector<StepReport> reports_;                  ///< of the islands that step in parallel, and
-  std::vector<std::exception_ptr> errors_;           ///< what they throw
+  int threads_ = 0;                                  ///< See parallelFor().
+  std::vector<StepReport> reports_;                  ///< of the islands that step in parallel
+  std::vector<std::exception_ptr> errors_;           ///< that these islands throw
 };
 
 }   // namespace slender

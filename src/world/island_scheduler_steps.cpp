@@ -89,8 +89,8 @@ void IslandScheduler::arrange(WorldState& state, const WorldInputs& inputs)
   }
 }
 
-/// Large islands one after the other, each on all threads, then the others in parallel. Throws what one of these
-/// throws, after all of them.
+/// Steps large islands one after the other, each on all threads, and then the others in parallel. If one of the others
+/// throws, all of them end their steps before this function throws the same.
 StepReport IslandScheduler::stepIslands()
 {
   StepReport total;

@@ -14,7 +14,8 @@ struct GraspMotion
 {
   Pose X;
   Twist V;
-  bool operator==(const GraspMotion& other) const   // to the last bit
+  /// Compares without a tolerance.
+  bool operator==(const GraspMotion& other) const
   {
     return X.position == other.X.position && X.orientation.coeffs() == other.X.orientation.coeffs() &&
            V.linear == other.V.linear && V.angular == other.V.angular;

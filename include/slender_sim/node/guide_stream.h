@@ -41,8 +41,9 @@ inline FadeWeights fadeOut(double elapsed, double duration, double rate_duration
 
 /// Follows a stream of stamped samples in simulated time: what GuideBuffer and PointGuideBuffer have in common.
 /// `Trajectory` joins the samples (PoseTrajectory, PointTrajectory). It is evaluated at instants that GuideTiming
-/// chooses. When it has changed at the last instant, an offset leads from the last output to it and fades. `Motion` is
-/// a place and its velocity; the derived class evaluates the trajectory and has the offset.
+/// chooses. If new samples have changed the trajectory at the last instant, an offset leads from the last output to the
+/// trajectory, and fades. `Motion` is a place and its velocity. The derived class evaluates the trajectory and stores
+/// the offset.
 template <class Trajectory, class Motion>
 class GuideStream
 {
@@ -149,7 +150,7 @@ protected:
   }
   FadeWeights fade(double time) const { return fadeOut(time - fade_start_, fade_duration_, fade_rate_duration_); }
 
-  /// What follows stands still there, and catches up with the stream.
+  /// The output stands still at `place`, whose velocity is zero, and then catches up with the stream.
   void standAt(const Motion& place)
   {
     last_ = place;

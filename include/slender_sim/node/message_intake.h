@@ -206,7 +206,7 @@ private:
   const User user_;
   const std::size_t most_pending_;
   const std::chrono::steady_clock::duration patience_;
-  std::deque<Pending> pending_;   // wait for their transforms
+  std::deque<Pending> pending_;   // messages that wait for transforms
   PausedMessages<Message> paused_;
 };
 

@@ -11,7 +11,8 @@ namespace slender {
 struct PointMotion
 {
   Eigen::Matrix3Xd x, v;
-  bool operator==(const PointMotion& other) const { return x == other.x && v == other.v; }   // to the last bit
+  /// Compares without a tolerance.
+  bool operator==(const PointMotion& other) const { return x == other.x && v == other.v; }
 };
 
 /// Turns a stream of stamped guide vertices into a motion of the guide that never jumps in position or velocity. The
@@ -43,7 +44,7 @@ private:
   void blend(double time, const PointMotion& from, const PointMotion& to) override;
 
   GuideBuffer::Options options_;
-  PointMotion offset_;   // at its start
+  PointMotion offset_;   // when it began
 };
 
 }   // namespace slender

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -131,13 +132,13 @@ private:
   void requireInput() const;   // throws std::runtime_error if service calls must not change the run
 
   /// Offers a service. act(this, request, response) does what the request asks and fills the response, or throws
-  /// std::exception with the reason why not.
+  /// std::runtime_error or std::invalid_argument with the reason why not. The log tells of other exceptions.
   template <class Service, class Act>
   void offer(const std::string& name, const Act& act)
   {
     using Request = typename Service::Request;
     using Response = typename Service::Response;
-    const boost::function<bool(Request&, Response&)> answer = [this, act](Request& request, Response& response) {
+    const boost::function<bool(Request&, Response&)> answer = [this, name, act](Request& request, Response& response) {
       response.success = true;
       try
       {
@@ -147,6 +148,8 @@ private:
       {
         response.success = false;
         response.message = e.what();
+        if (!dynamic_cast<const std::runtime_error*>(&e) && !dynamic_cast<const std::invalid_argument*>(&e))
+          ROS_ERROR_STREAM("service ~" << name << ": " << e.what());
       }
       return true;
     };
