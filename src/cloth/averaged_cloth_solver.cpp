@@ -24,8 +24,13 @@ AveragedClothSolver::AveragedClothSolver(const ClothModel& model, const ClothOpt
   for (std::size_t s = 0; s < average_sets_.size(); ++s)
   {
     average_sets_[s].prescribed = &model.averages[s];
-    average_sets_[s].solver.setConstraints(*model.averages[s].weights, model.averages[s].bounds.size() > 0);
-    average_sets_[s].swept = sweepsSuit(model.averages[s]);
+    const bool swept = sweepsSuit(model.averages[s]);
+    using Schur = ConstrainedCholesky::Schur;
+    average_sets_[s].solver.setConstraints(*model.averages[s].weights, model.averages[s].bounds.size() > 0
+                                                                           ? Schur::bounded
+                                                                       : swept ? Schur::inverse
+                                                                               : Schur::none);
+    average_sets_[s].swept = swept;
   }
   if (std::any_of(average_sets_.begin(), average_sets_.end(), [](const AverageSet& set) { return set.swept; }))
     sweeps_.setPattern(system.matrix(), system.constantMatrix());

@@ -16,7 +16,6 @@ constexpr double kShiftOfAngle = 0.2;     ///< of the weight of inertia, per uni
 constexpr double kFirstShift = 1e-3;      ///< of all vertices in statics, per unit of a shift of angles
 constexpr int kTimesWork = 5;             ///< of a step in an island, over that of a cloth alone
 constexpr long kSharedFactorWork = 100;   ///< counts of a WorkBudget per vertex
-constexpr long kSharedSolutionWork = 4;   ///< likewise, of a solution with the factor
 constexpr double kMostTurn = 0.7;         ///< of an edge in an iteration [rad], as for edges of rods
 
 }   // namespace
@@ -35,11 +34,6 @@ ClothPart::ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions
       throw std::invalid_argument("cloth '" + m.name +
                                   "': bounds of the forces of averages (max_traction) need contact by impulses, or no "
                                   "contact");
-    if (set.count() > kMostAverages)
-      throw std::invalid_argument("cloth '" + m.name + "': contact by the barrier takes at most " +
-                                  std::to_string(kMostAverages) + " averages, and this cloth has " +
-                                  std::to_string(set.count()) +
-                                  ": take fewer and larger test functions, or contact: {method: impulses}");
     average_sets_.push_back(std::make_unique<AverageConstraints>(*set.weights));
   }
   allocate();
@@ -160,9 +154,10 @@ Largest ClothPart::unbalancedForce() const
 
 bool ClothPart::numberUnknowns()
 {
-  if (!number_.empty() && system().held() == held_)
+  if (!number_.empty() && system().held() == held_ && averages_ == numbered_with_)
     return true;
   held_ = system().held();
+  numbered_with_ = averages_;
   number_.resize(held_.size());
   unknowns_ = 0;
   for (std::size_t i = 0; i < held_.size(); ++i)
@@ -371,7 +366,7 @@ void ClothPart::takeDirection(const double* solution)
       vertex(direction_, i).setZero();
   near_ = incrementSize(0.0) < kNear;
   if (averages_)
-    work_.spend(points() * (kSharedFactorWork + 3 * averages_->count() * kSharedSolutionWork));
+    work_.spend(points() * kSharedFactorWork);
 }
 
 // ---- measures

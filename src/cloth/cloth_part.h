@@ -20,12 +20,9 @@ namespace slender {
 class ClothPart final : public Part
 {
 public:
-  /// Averages that a set may have. Each iteration solves for three multipliers per average.
-  static constexpr int kMostAverages = 500;
-
   /// Throws std::invalid_argument for other integrators than implicit_euler, for averages whose forces have bounds, and
   /// for a model or options that are not valid. The island minimises wholly, whether the options ask for one Newton
-  /// step or not. A cloth with prescribed averages is always coupled, because its own solvers know no averages.
+  /// step or not.
   ClothPart(std::shared_ptr<const ClothModel> model, const ClothOptions& options);
   /// A cloth that is alone in its island. It takes all integrators of cloth, bounds of the forces of averages, and
   /// `one_newton_step` of the options. The working copy must outlive the part. Its owner starts the budget
@@ -78,7 +75,6 @@ private:
   BoundingBox surfaceBox(double ahead) const override;
 
   // ---- as Part
-  bool joined() const override { return averages_ != nullptr; }
   AverageConstraints* averages() override { return averages_; }
   void meetAverages() override;
   void addTriples(std::vector<char>& turns) const override { turns.insert(turns.end(), unknowns_ / 3, 0); }
@@ -175,6 +171,7 @@ private:
   int unknowns_ = 0;
   std::vector<int> number_;   ///< per vertex: of the first of its unknowns in the part, or kPrescribed
   std::vector<char> held_;    ///< for which the vertices were numbered
+  const AverageConstraints* numbered_with_ = nullptr;   ///< the averages that acted then
   /// Where the entries go in the matrix of the island: for each block, and for each entry of the constant matrix on or
   /// below the diagonal, the indices of the values where its three columns begin. -1: it has none.
   std::vector<int> block_entries_, constant_entries_;

@@ -9,8 +9,8 @@ namespace slender {
 
 /// Weighted averages of a part's points that are prescribed: C x = targets (thesis 6.4.3, see WeakConstraints). The
 /// averages move uniformly in a step, like everything that is prescribed. The base and the trial of the part always
-/// have the averages of the present instant. Directions of Newton's method do not change the averages, see
-/// SchurComplement.
+/// have the averages of the present instant. Directions of Newton's method do not change the averages: the matrix of
+/// the island has their multipliers, see Equations.
 class AverageConstraints
 {
 public:

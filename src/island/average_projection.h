@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
 namespace slender {
@@ -20,10 +20,9 @@ public:
     : c_(c),
       scale_(Eigen::VectorXd::Zero(c.cols())),
       free_(static_cast<std::size_t>(c.cols()), 2),
-      row_(Eigen::VectorXd::Zero(c.cols())),
-      gram_(c.rows(), c.rows()),
-      factor_(c.rows()),
+      rooted_(c),
       pull_(c.rows()),
+      solved_(c.rows()),
       moved_(c.cols())
   {
   }
@@ -52,7 +51,11 @@ public:
   const Eigen::VectorXd& displacements(const Changes& changes)
   {
     pull_ = changes;
-    factor_.solveInPlace(pull_);
+    solved_ = factor_.permutationP() * pull_;
+    factor_.matrixL().solveInPlace(solved_);
+    solved_.array() /= pivots_.array();
+    factor_.matrixU().solveInPlace(solved_);
+    pull_ = factor_.permutationPinv() * solved_;   // factor_.solve() would take memory
     moved_.setZero();
     for (Eigen::Index i = 0; i < c_.rows(); ++i)
       for (Averages::InnerIterator entry(c_, i); entry; ++entry)
@@ -65,35 +68,22 @@ private:
   bool factor()
   {
     for (Eigen::Index i = 0; i < c_.rows(); ++i)
-    {
-      for (Averages::InnerIterator entry(c_, i); entry; ++entry)
-        row_[entry.col()] = entry.value() * scale_[entry.col()];
-      for (Eigen::Index k = 0; k < c_.rows(); ++k)
-      {
-        double sum = 0.0;
-        for (Averages::InnerIterator entry(c_, k); entry; ++entry)
-          sum += entry.value() * row_[entry.col()];
-        gram_(k, i) = sum;
-      }
-      for (Averages::InnerIterator entry(c_, i); entry; ++entry)
-        row_[entry.col()] = 0.0;
-    }
-    const double scale = gram_.diagonal().maxCoeff();
-    factor_.compute(gram_);
-    for (Eigen::Index i = 0; i < c_.rows(); ++i)   // what is left of a row beside the others
-      if (!(factor_.vectorD()[i] > 1e-12 * scale))
-        return false;
-    return true;
+      for (Averages::InnerIterator entry(c_, i), rooted(rooted_, i); entry; ++entry, ++rooted)
+        rooted.valueRef() = entry.value() * std::sqrt(scale_[entry.col()]);
+    const Eigen::SparseMatrix<double> gram = rooted_ * rooted_.transpose();
+    factor_.compute(gram);
+    pivots_ = factor_.vectorD();
+    // what is left of a row beside the others
+    return factor_.info() == Eigen::Success && pivots_.minCoeff() > 1e-12 * gram.diagonal().maxCoeff();
   }
 
   const Averages& c_;
   Eigen::VectorXd scale_;    ///< per point: 1 / mass, 0 where it is held
-  std::vector<char> free_;   ///< for which gram_ was factored
-  Eigen::VectorXd row_;      ///< one row of C M^-1
-  Eigen::MatrixXd gram_;
-  Eigen::LDLT<Eigen::MatrixXd> factor_;
+  std::vector<char> free_;   ///< for which factor_ was made
+  Averages rooted_;          ///< C M^-1/2
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
   bool independent_ = false;
-  Eigen::VectorXd pull_, moved_;
+  Eigen::VectorXd pivots_, pull_, solved_, moved_;
 };
 
 }   // namespace slender

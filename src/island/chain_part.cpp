@@ -53,7 +53,8 @@ void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], co
 /// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the band.
 void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  const bool alone = !coupled && own_terms.empty() && !averages_;
+  touched_ = false;
+  const bool alone = !coupled && own_terms.empty();
   evaluation = alone ? system_.evaluate(with_hessian, shift) : system_.evaluateWhole(with_hessian);
   if (averages_)
     averages_->forEntries([&](Eigen::Index i, int node, double weight) {
@@ -78,20 +79,6 @@ void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
   for (const ContactRow* row : own_rows)
     addToPanels(row->point, row->along, row->stiffness * row->normal * row->normal.transpose());
   evaluation.inertia = system_.factorWhole(shift);
-}
-
-void ChainPart::solve()
-{
-  system_.solve();
-  if (!averages_)
-    return;
-  schur_.begin(3 * averages_->count(), 4 * system_.nodes());
-  averages_->forEntries([&](Eigen::Index i, int node, double weight) {
-    for (int k = 0; k < 3 && system_.isFree(node); ++k)
-      schur_.add(3 * i + k, 4 * node + k, weight);
-  });
-  schur_.correct(system_.direction(), [this](double* x) { system_.solveFor(x); });
-  averages_->addMultipliers(schur_.change().data());
 }
 
 void ChainPart::meetAverages()
@@ -214,6 +201,7 @@ int ChainPart::base(int point) const
 
 void ChainPart::addForce(int point, const Eigen::Vector3d& force)
 {
+  touched_ = true;
   if (const int node = nodeOf(point); node >= 0)
     Eigen::Map<Eigen::Vector3d>(system_.gradient() + 4 * node) -= force;
 }

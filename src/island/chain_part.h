@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "island/part.h"
-#include "island/schur_complement.h"
 #include "slender_sim/dynamics/chain_system.h"
 
 namespace slender {
@@ -26,7 +25,7 @@ public:
 
   void evaluate(bool with_hessian, const HessianShift& shift) override;
   void closeGradient() override { system_.closeGradient(); }
-  void solve() override;
+  void solve() override { system_.solve(); }
   void solveAgain() override { system_.solveAgain(); }
   AverageConstraints* averages() override { return averages_.get(); }
   void meetAverages() override;
@@ -63,6 +62,7 @@ protected:
   /// Per unknown of the chain, four per node: its number within the part, kPrescribed, or less where something else
   /// carries it.
   std::vector<int> dof_;
+  bool touched_ = false;   ///< by anything in the last evaluation
 
 private:
   template <class F>
@@ -71,7 +71,6 @@ private:
                    const Eigen::Vector3d& column = Eigen::Vector3d::Zero());
 
   int unknowns_ = 0;
-  SchurComplement schur_;   ///< of the averages, while the part is not coupled
   /// For every place of the panels: the index of its entry among the values of the island's matrix. -1: the place has
   /// no entry.
   std::vector<int> entries_;

@@ -134,8 +134,8 @@ void Equations::settle()
 {
   if (moved_fully_ && by_newton_ && !std::isfinite(tolerances.most_unbalanced))
   {
-    // Sweeps and averages solve for all coupled parts together.
-    const bool together = matrix_.solver() == SharedMatrix::Solver::sweeps || anyAverages();
+    // Sweeps solve for all coupled parts together.
+    const bool together = matrix_.solver() == SharedMatrix::Solver::sweeps;
     group_moves_.assign(parts_.size(), false);
     for (const Part* part : parts_)
       if (!part->settled && ((together && part->coupled) || !hasArrived(*part)))

@@ -8,7 +8,6 @@
 
 #include "confined_newton.h"
 #include "island/part.h"
-#include "island/schur_complement.h"
 #include "slender_sim/dynamics/time_config.h"
 #include "slender_sim/geometry/pose_motion.h"
 
@@ -182,8 +181,10 @@ private:
   void addTerm(const ContactTerm& term, const ContactRow* rows, int count, bool whole);
   RodEvaluation evaluateParts(bool with_hessian, const HessianShift& shift);
   bool factor(const HessianShift& shift);
-  bool anyAverages() const;
-  void keepAverages();
+  template <class F>
+  void forAverages(F&& f) const;
+  template <class F>
+  void forConstraints(F&& f) const;
   void follow();
 
   std::vector<Part*> parts_;
@@ -191,8 +192,7 @@ private:
   double duration_ = 1.0;
 
   SharedMatrix matrix_;
-  SchurComplement schur_;             ///< of the averages of coupled parts
-  std::vector<double> constrained_;   ///< direction of all coupled unknowns
+  int multipliers_ = 0;   ///< number of the first multiplier of averages in the matrix, which come last
   /// The matrix knows what parts couple by themselves, and has room for all contacts of keys_.
   bool parts_valid_ = false, keys_valid_ = false;
   bool exact_ = false;

@@ -152,6 +152,36 @@ void Equations::columnsOf(const ContactRow& contact, bool whole, Part::Columns& 
   }
 }
 
+/// Calls f for all parts that have averages, which are coupled, with the number of the first of their multipliers.
+template <class F>
+void Equations::forAverages(F&& f) const
+{
+  int first = multipliers_;
+  for (Part* part : parts_)
+    if (part->averages())
+    {
+      f(*part, first);
+      first += 3 * static_cast<int>(part->averages()->count());
+    }
+}
+
+/// Calls f for all entries of the averages' constraints on directions: with a multiplier, and what a component of a
+/// point's displacement adds to its row. If a body carries the point, these are unknowns of the body.
+template <class F>
+void Equations::forConstraints(F&& f) const
+{
+  forAverages([&](Part& part, int first) {
+    part.averages()->forEntries([&](Eigen::Index i, int point, double weight) {
+      for (int c = 0; c < 3; ++c)
+      {
+        Part::Columns row;
+        part.addColumns(point, c, weight, row);
+        f(first + 3 * static_cast<int>(i) + c, row);
+      }
+    });
+  });
+}
+
 /// Notes what parts couple by themselves, unless the matrix knows it already.
 void Equations::noteParts()
 {
@@ -159,7 +189,7 @@ void Equations::noteParts()
   for (Part* part : parts_)
   {
     coupled_.push_back(part->coupled);
-    part->coupled = part->joined();
+    part->coupled = part->joined() || part->averages();
   }
   for (const Key& key : keys_)
   {
@@ -183,10 +213,18 @@ void Equations::noteParts()
     part->offset = unknowns;
     unknowns += part->coupled ? part->unknowns() : 0;
   }
-  matrix_.begin(unknowns);
+  multipliers_ = unknowns;
+  forAverages([&](Part& part, int) { unknowns += 3 * static_cast<int>(part.averages()->count()); });
+  matrix_.begin(unknowns, unknowns - multipliers_);
   for (Part* part : parts_)
     if (part->coupled)
       part->notePattern(matrix_);
+  for (int multiplier = multipliers_; multiplier < unknowns; ++multiplier)
+    matrix_.note(multiplier, multiplier);
+  forConstraints([&](int multiplier, const Part::Columns& row) {
+    for (int k = 0; k < row.count; ++k)
+      matrix_.note(row.index[k], multiplier);
+  });
   matrix_.keepNoted();
   parts_valid_ = true;
 }
@@ -244,9 +282,10 @@ void Equations::buildPattern()
 
 SharedMatrix::Solver Equations::chooseSolver()
 {
-  // The Schur complement of averages needs many exact solutions.
-  return solver == IslandSolver::automatic && !anyAverages() && sweepsPay() ? SharedMatrix::Solver::sweeps
-                                                                            : SharedMatrix::Solver::cholesky;
+  // Sweeps solve for no multipliers.
+  return solver == IslandSolver::automatic && multipliers_ == matrix_.unknowns() && sweepsPay()
+             ? SharedMatrix::Solver::sweeps
+             : SharedMatrix::Solver::cholesky;
 }
 
 /// Returns whether sweeps over points are the fastest solver. They are faster than a factorisation for cloth of any
@@ -278,6 +317,10 @@ void Equations::assemble(const HessianShift& shift, bool whole)
   for (Part* part : parts_)   // Joints add to entries of both parts.
     if (part->coupled && part->joined() && !part->settled)
       part->addHessian(matrix_, shift);
+  forConstraints([&](int multiplier, const Part::Columns& row) {
+    for (int k = 0; k < row.count; ++k)
+      matrix_.add(row.index[k], multiplier, row.value[k]);
+  });
   if (!contact_)
     return;
   // The rows of a term have its points, and follow in the order of terms.
@@ -320,6 +363,7 @@ bool Equations::factor(const HessianShift& shift)
       matrix_.setIdle(part->offset, part->unknowns(), part->settled);
       part->takeGradient(matrix_.solution());
     }
+  std::fill(matrix_.solution() + multipliers_, matrix_.solution() + matrix_.unknowns(), 0.0);
   const auto assembled = [&](bool whole) { assemble(shift, whole); };
   return exact_ ? matrix_.factorExactly(assembled) : matrix_.factor(contact_ && !contact_->terms().empty(), assembled);
 }
@@ -396,8 +440,10 @@ void Equations::solve()
     part->has_direction = !part->settled;
   matrix_.solve();
   linear_iterations_ += matrix_.linearIterations();
-  if (anyAverages())
-    keepAverages();
+  forAverages([&](Part& part, int first) {
+    if (!part.settled)
+      part.averages()->addMultipliers(matrix_.solution() + first);
+  });
   forParts([](Part& part) {
     if (!part.coupled)
       part.solve();
@@ -407,56 +453,11 @@ void Equations::solve()
     measureContacts();
 }
 
-bool Equations::anyAverages() const
-{
-  return std::any_of(parts_.begin(), parts_.end(), [](Part* part) { return part->coupled && part->averages(); });
-}
-
-/// Removes from the solution the component that would change the prescribed averages of coupled parts. If a body
-/// carries some of the points, the constraints contain the unknowns of the body.
-void Equations::keepAverages()
-{
-  Eigen::Index rows = 0;
-  for (Part* part : parts_)
-    if (part->coupled && part->averages())
-      rows += 3 * part->averages()->count();
-  schur_.begin(rows, matrix_.unknowns());
-  Eigen::Index first = 0;
-  for (Part* part : parts_)
-  {
-    if (!part->coupled || !part->averages())
-      continue;
-    part->averages()->forEntries([&](Eigen::Index i, int point, double weight) {
-      for (int c = 0; c < 3; ++c)
-      {
-        Part::Columns row;
-        part->addColumns(point, c, weight, row);
-        for (int k = 0; k < row.count; ++k)
-          schur_.add(first + 3 * i + c, row.index[k], row.value[k]);
-      }
-    });
-    first += 3 * part->averages()->count();
-  }
-  constrained_.assign(matrix_.solution(), matrix_.solution() + matrix_.unknowns());
-  schur_.correct(constrained_.data(), [&](double* x) {
-    std::copy_n(x, constrained_.size(), matrix_.solution());
-    matrix_.solve();
-    std::copy_n(matrix_.solution(), constrained_.size(), x);
-  });
-  std::copy(constrained_.begin(), constrained_.end(), matrix_.solution());
-  const double* change = schur_.change().data();
-  for (Part* part : parts_)
-    if (part->coupled && part->averages())
-    {
-      part->averages()->addMultipliers(change);
-      change += 3 * part->averages()->count();
-    }
-}
-
 void Equations::solveAgain()
 {
   for (Part* part : parts_)
     part->coupled ? part->takeGradient(matrix_.solution()) : part->solveAgain();
+  std::fill(matrix_.solution() + multipliers_, matrix_.solution() + matrix_.unknowns(), 0.0);
   matrix_.solve();
   spread();
 }

@@ -90,8 +90,8 @@ public:
 /// part that is not coupled solves with its own matrix. It stays so while it touches only what moves as prescribed,
 /// because such contacts couple no more than neighbouring points of the part; they are its own contacts.
 ///
-/// The averages of a part may be prescribed. Directions must not change them: Equations takes care of this for coupled
-/// parts, and the other parts do so in solve(). The gradient of a part contains the forces of its averages.
+/// The averages of a part may be prescribed. Such a part is always coupled, and Equations solves for directions that do
+/// not change the averages. The gradient of the part contains the forces of its averages.
 class Part : public PartInIsland, public PartSurface, public PartStatics
 {
 public:

@@ -4,9 +4,10 @@
 
 namespace slender {
 
-void SharedMatrix::begin(int unknowns)
+void SharedMatrix::begin(int unknowns, int multipliers)
 {
   unknowns_ = unknowns;
+  multipliers_ = multipliers;
   for (auto* lists : {&columns_, &blocks_below_})
     if (static_cast<int>(lists->size()) < unknowns_)
       lists->resize(unknowns_);
@@ -175,7 +176,7 @@ bool SharedMatrix::factorDirectly()
   if (unknowns_ == 0)
     return true;
   if (!cholesky_known_)
-    cholesky_.setPattern(starts_, rows_);
+    cholesky_.setPattern(starts_, rows_, multipliers_);
   cholesky_known_ = true;
   return cholesky_.factor(values_, idle_, threads_);
 }

@@ -65,7 +65,9 @@ public:
   void setThreads(int threads) { threads_ = threads; }   ///< that factor and solve
 
   // ---- pattern
-  void begin(int unknowns);
+  /// The last `multipliers` of the unknowns are multipliers of constraints, see SparseCholesky. What a constraint
+  /// couples, and the diagonal entries of multipliers, are to be noted like all else.
+  void begin(int unknowns, int multipliers = 0);
   void note(int a, int b) { columns_[std::min(a, b)].push_back(std::max(a, b)); }
   void notePairs(const Columns& a, const Columns& b);
   /// Everything that these rows contain together.
@@ -168,7 +170,7 @@ private:
   /// the matrix may be indefinite with them.
   Backoff whole_;
   Backoff swept_;   ///< When to try sweeps. They fail if they need too many iterations.
-  int unknowns_ = 0;
+  int unknowns_ = 0, multipliers_ = 0;
   std::vector<std::vector<int>> columns_;        ///< what has been noted since begin() or beginAgain()
   std::vector<std::vector<int>> blocks_below_;   ///< Blocks of 3 x 3 entries: first rows, by first columns.
   std::vector<int> kept_starts_, kept_rows_;     ///< what keepNoted() keeps

@@ -36,7 +36,8 @@ void ComponentCholesky::analyse(Component& component)
 {
   const auto [first, end] = known_.equal_range(component.hash);
   const auto same = std::find_if(first, end, [&](const auto& known) {
-    return known.second.starts == component.starts && known.second.rows == component.rows;
+    return known.second.starts == component.starts && known.second.rows == component.rows &&
+           known.second.multipliers == component.multipliers;
   });
   if (same != end)
   {
@@ -44,11 +45,12 @@ void ComponentCholesky::analyse(Component& component)
     known_.erase(same);
     return;
   }
-  component.cholesky.emplace(simplicial_);
-  component.cholesky->setPattern(static_cast<int>(component.unknowns.size()), component.starts, component.rows);
+  component.cholesky.emplace(simplicial_ && component.multipliers == 0);
+  component.cholesky->setPattern(static_cast<int>(component.unknowns.size()), component.starts, component.rows,
+                                 component.multipliers);
 }
 
-void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::vector<int>& rows)
+void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::vector<int>& rows, int multipliers)
 {
   constexpr std::uint64_t kBasis = 0xcbf29ce484222325, kPrime = 0x100000001b3;   // Constants of the hash FNV-1a.
   for (Component& component : components_)
@@ -61,9 +63,11 @@ void ComponentCholesky::setPattern(const std::vector<int>& starts, const std::ve
     component.starts.push_back(0);
     component.x.resize(component.unknowns.size());
   }
+  const std::size_t first_multiplier = component_of_.size() - multipliers;
   for (std::size_t u = 0; u < component_of_.size(); ++u)
   {
     Component& component = components_[component_of_[u]];
+    component.multipliers += u >= first_multiplier;
     for (int k = starts[u]; k < starts[u + 1]; ++k)
     {
       component.entries.push_back(k);

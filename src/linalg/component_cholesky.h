@@ -20,11 +20,11 @@ public:
   /// `simplicial`: see SparseCholesky.
   explicit ComponentCholesky(bool simplicial) : simplicial_(simplicial) {}
 
-  /// Takes the lower triangle by columns, in the form of SparseCholesky::setPattern().
-  void setPattern(const std::vector<int>& starts, const std::vector<int>& rows);
-  /// Returns whether the matrix is positive definite. `values` has one value per entry of the pattern. Components whose
-  /// first unknown is `idle`, of which there is one entry per unknown, are left out, also by solve(). `threads`: see
-  /// parallelFor().
+  /// Takes the lower triangle by columns and the number of multipliers, in the form of SparseCholesky::setPattern().
+  void setPattern(const std::vector<int>& starts, const std::vector<int>& rows, int multipliers = 0);
+  /// Returns whether the matrix is positive definite, see SparseCholesky::factor() for multipliers. `values` has one
+  /// value per entry of the pattern. Components whose first unknown is `idle`, of which there is one entry per unknown,
+  /// are left out, also by solve(). `threads`: see parallelFor().
   bool factor(const std::vector<double>& values, const std::vector<char>& idle, int threads);
   /// x := A^-1 x after a factor() that returned true.
   void solve(double* x, int threads);
@@ -35,7 +35,8 @@ private:
     std::vector<int> unknowns, entries;   ///< places in the matrix; unknowns are in ascending order
     std::vector<int> starts, rows;        ///< the pattern, in the numbers of the component
     std::vector<double> x;                ///< work space of solve()
-    std::uint64_t hash = 0;               ///< of the pattern
+    int multipliers = 0;
+    std::uint64_t hash = 0;   ///< of the pattern
     bool idle = false, definite = false;
     std::optional<SparseCholesky> cholesky;
   };

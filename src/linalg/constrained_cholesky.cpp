@@ -11,26 +11,6 @@ namespace slender {
 
 namespace {
 
-// W over what it takes to move a constraint's points apart from all others: a round leaves one over it, rounding errors
-// are it times as large
-constexpr double kStiff = 2e5;
-constexpr int kRounds = 3;   // to rounding
-// of a preconditioner: the gap that is left is closed when all motions of a step are known
-constexpr int kFewRounds = 2;
-
-/// Measured: entries of C^T W C, and of a factor without it, against those of S^-1.
-bool roundsSuit(const ConstrainedCholesky::Constraints& c)
-{
-  constexpr Eigen::Index kLeast = 400;
-  const double m = static_cast<double>(c.rows()), n = static_cast<double>(c.cols());
-  if (c.rows() < kLeast || c.rows() > c.cols() || m * m < 25.0 * n)
-    return false;
-  double entries = 0.0;
-  for (Eigen::Index i = 0; i < c.rows(); ++i)
-    entries += std::pow(static_cast<double>(c.row(i).nonZeros()), 2);
-  return entries < 2.0 * m * m;
-}
-
 /// Lower triangle of a positive definite matrix: its factor.
 void factorInPlace(Eigen::Ref<Eigen::MatrixXd> a)
 {
@@ -51,11 +31,12 @@ double ConstrainedCholesky::Rows::multiply(double factor, const double* x, doubl
                                  factor, x, y);
 }
 
-void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
+void ConstrainedCholesky::setConstraints(const Constraints& c, Schur schur)
 {
   c_ = c;
-  c_rows_ = Rows();
-  if (bounded)
+  schur_ = schur;
+  fill(c_, c_rows_);
+  if (schur == Schur::bounded)
   {
     s_.resize(c.rows(), c.rows());
     inner_.resize(c.rows(), c.rows());
@@ -66,11 +47,10 @@ void ConstrainedCholesky::setConstraints(const Constraints& c, bool bounded)
   const std::size_t size = 4 * static_cast<std::size_t>(std::max(c.rows(), c.cols()));
   for (PointVector* v : {&y_, &t_, &mu_})
     v->assign(size, 0.0);
-  many_ = !bounded && roundsSuit(c);
-  pattern_fixed_.clear();
-  if (many_)
-    for (PointVector* v : {&load_, &right_})
-      v->assign(size, 0.0);
+  matrix_ = PointMatrix();
+  if (schur == Schur::none)
+    for (PointVector* v : {&whole_right_, &image_})
+      v->assign(4 * static_cast<std::size_t>(c.rows() + c.cols()), 0.0);
 }
 
 void ConstrainedCholesky::fill(const Constraints& from, Rows& to)
@@ -90,61 +70,44 @@ bool ConstrainedCholesky::factor(const PointMatrix& pattern, const double* value
   Constraints free = c_.transpose();
   free.prune([fixed](Eigen::Index point, Eigen::Index, double) { return !fixed || !fixed[point]; });
   fill(free, c_transposed_);
-  if (c_rows_.values.empty())
-    fill(c_, c_rows_);
-  in_rounds_ = many_ && factorRounds(pattern, values, fixed);
-  return in_rounds_ || factorSchur(p, fixed);
+  return schur_ == Schur::none ? factorWhole(pattern, values, fixed) : factorSchur(p, fixed);
 }
 
-/// False: too stiff for a factor, or rounds do not converge as fast as those of constraints that are well apart.
-bool ConstrainedCholesky::factorRounds(const PointMatrix& pattern, const double* values, const char* fixed)
+bool ConstrainedCholesky::factorWhole(const PointMatrix& pattern, const double* values, const char* fixed)
 {
+  // A constraint depends on others if almost nothing is left of its pivot, over what it would have with P diagonal. The
+  // pivot's rounding error is some 1e-16 of what it has without the others, which may be 1e4 times as large.
+  constexpr double kLeast = 1e-9;
   const int m = count(), n = pattern.size();
   std::vector<Eigen::Triplet<double>> entries;
+  std::vector<double> diagonal(n), gives(m, 0.0);
   for (int i = 0; i < n; ++i)
     for (int k = pattern.starts()[i]; k < pattern.starts()[i + 1]; ++k)
+    {
       entries.emplace_back(i, pattern.column(k), values[k]);
-  Constraints p(n, n);
-  p.setFromTriplets(entries.begin(), entries.end());
-  fill(p, p_rows_);
-  const Eigen::VectorXd diagonal = p.diagonal();
-  Constraints c = c_;
-  c.prune([fixed](Eigen::Index, Eigen::Index point, double) { return !fixed || !fixed[point]; });
-  weights_.resize(m);
+      if (pattern.column(k) == i)
+        diagonal[i] = values[k];
+    }
   for (int i = 0; i < m; ++i)
-  {
-    double give = 0.0;
-    for (Constraints::InnerIterator entry(c, i); entry; ++entry)
-      give += entry.value() * entry.value() / diagonal[entry.col()];
-    weights_[i] = kStiff / give;
-    if (!std::isfinite(weights_[i]))
-      return false;
-  }
-  const Constraints added =
-      c.transpose() * Constraints(Eigen::Map<const Eigen::VectorXd>(weights_.data(), m).asDiagonal() * c);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Constraints::InnerIterator entry(added, i); entry; ++entry)
-      entries.emplace_back(i, entry.col(), entry.value());
-  const PointMatrix stiff(n, entries);
-  std::vector<char> now(static_cast<std::size_t>(n) + 1, 1);   // not empty
+    for (Constraints::InnerIterator entry(c_, i); entry; ++entry)
+    {
+      entries.emplace_back(n + i, entry.col(), entry.value());
+      entries.emplace_back(entry.col(), n + i, entry.value());
+      gives[i] += fixed && fixed[entry.col()] ? 0.0 : entry.value() * entry.value() / diagonal[entry.col()];
+    }
+  const std::vector<int> starts = matrix_.starts();
+  matrix_ = PointMatrix(n + m, entries);
+  if (matrix_.starts() != starts)   // the pattern of one mesh
+    whole_.setPattern(matrix_, m);
+  std::vector<char> is_fixed(static_cast<std::size_t>(n + m), 0);
   if (fixed)
-    std::copy_n(fixed, n, now.begin());
-  if (now != pattern_fixed_)
-    stiff_.setPattern(stiff);
-  pattern_fixed_ = std::move(now);
-  if (!stiff_.factor(stiff, fixed))
+    std::copy_n(fixed, n, is_fixed.begin());
+  if (!whole_.factor(matrix_, is_fixed.data()))
     return false;
-  // a gap that is as rough as one can be
-  constexpr double kLeft = 1e-8;
-  PointVector gap(4 * static_cast<std::size_t>(m), 0.0), mu(gap.size()), z(4 * static_cast<std::size_t>(n), 0.0);
   for (int i = 0; i < m; ++i)
-    point(gap, i) = Eigen::Vector3d(1.0, i % 2 == 0 ? 1.0 : -1.0, std::cos(static_cast<double>(i) * i));
-  solveInRounds(z.data(), gap.data(), kFewRounds, z.data(), mu.data());
-  c_rows_.multiply(0.0, z.data(), t_.data());
-  double left = 0.0;
-  for (int i = 0; i < m; ++i)
-    left = std::max(left, (point(t_, i) - point(gap, i)).lpNorm<Eigen::Infinity>());
-  return left <= kLeft;
+    if (!(whole_.pivot(n + i) > kLeast * gives[i]))
+      return false;
+  return true;
 }
 
 bool ConstrainedCholesky::factorSchur(const SparseCholesky& p, const char* fixed)
@@ -199,31 +162,16 @@ void ConstrainedCholesky::leaveOut(const std::vector<int>& rows)
   factorInPlace(inner);
 }
 
-/// From mu = 0: z is that of the constraints' forces so far and of a stiffness W that closes what they leave open; its
-/// forces are the next. 4 doubles each.
-void ConstrainedCholesky::solveInRounds(const double* r, const double* g, int rounds, double* z, double* mu) const
+/// z and mu, one after the other, into whole_right_; r or g null: zero.
+void ConstrainedCholesky::solveWhole(const double* r, const double* g) const
 {
-  const int m = count(), n = static_cast<int>(c_.cols());
+  const std::size_t ends = 4 * static_cast<std::size_t>(c_.cols());
+  std::fill(whole_right_.begin(), whole_right_.end(), 0.0);
   if (r)
-    std::copy_n(r, 4 * n, load_.data());
-  else
-    std::fill(load_.begin(), load_.end(), 0.0);
-  std::fill_n(mu, 4 * m, 0.0);
-  for (int round = 0; round < rounds; ++round)
-  {
-    for (int i = 0; i < m; ++i)
-      for (int k = 4 * i; k < 4 * i + 4; ++k)
-        right_[k] = (g ? weights_[i] * g[k] : 0.0) - mu[k];
-    std::copy_n(load_.data(), 4 * n, y_.data());
-    c_transposed_.multiply(1.0, right_.data(), y_.data());
-    stiff_.solvePoints(y_.data(), y_.data());
-    c_rows_.multiply(0.0, y_.data(), right_.data());
-    for (int i = 0; i < m; ++i)
-      for (int k = 4 * i; k < 4 * i + 4; ++k)
-        mu[k] += weights_[i] * (right_[k] - (g ? g[k] : 0.0));
-  }
-  if (z)
-    std::copy_n(y_.data(), 4 * n, z);
+    std::copy_n(r, ends, whole_right_.begin());
+  if (g)
+    std::copy_n(g, 4 * count(), whole_right_.begin() + static_cast<std::ptrdiff_t>(ends));
+  whole_.solvePoints(whole_right_.data(), whole_right_.data());
 }
 
 /// mu = S^-1 t of what is not left out (Woodbury's formula)
@@ -252,17 +200,22 @@ void ConstrainedCholesky::inverse(const double* t, double* mu) const
 void ConstrainedCholesky::solve(const double* r, const double* g, double* z, double* mu, Norms* norms) const
 {
   const int m = count(), n = static_cast<int>(c_.cols());
-  if (in_rounds_)
+  if (schur_ == Schur::none)
   {
     if (norms)
     {
       p_->forwardPoints(r, y_.data());
-      const double load = pointKernels().dot(n, y_.data(), y_.data());
-      norms->load = std::hypot(std::sqrt(load), norm(g));
+      const double gap = norm(g), load = pointKernels().dot(n, y_.data(), y_.data());
+      norms->load = std::hypot(std::sqrt(load), gap);
     }
-    solveInRounds(r, g, g ? kRounds : kFewRounds, z, mu);
-    if (norms)   // y_ is z
-      norms->step = std::sqrt(std::max(p_rows_.multiply(0.0, y_.data(), load_.data()), 0.0));
+    solveWhole(r, g);
+    std::copy_n(whole_right_.data(), 4 * n, z);
+    std::copy_n(whole_right_.data() + 4 * n, 4 * m, mu);
+    if (norms)
+    {
+      std::fill(whole_right_.begin() + 4 * n, whole_right_.end(), 0.0);
+      norms->step = std::sqrt(std::max(matrix_.multiply(whole_right_.data(), image_.data()), 0.0));
+    }
     return;
   }
   p_->forwardPoints(r, y_.data());
@@ -365,10 +318,10 @@ void ConstrainedCholesky::addForces(const double* f, double* r) const
 
 double ConstrainedCholesky::norm(const double* g) const
 {
-  if (in_rounds_)   // of z, whose errors are small where those of mu, times W, are not
+  if (schur_ == Schur::none)
   {
-    solveInRounds(nullptr, g, kRounds, nullptr, mu_.data());
-    return std::sqrt(std::max(p_rows_.multiply(0.0, y_.data(), load_.data()), 0.0));
+    solveWhole(nullptr, g);
+    return std::sqrt(std::max(-pointKernels().dot(count(), g, whole_right_.data() + 4 * c_.cols()), 0.0));
   }
   std::copy_n(g, 4 * count(), t_.data());
   inverse(t_.data(), mu_.data());
@@ -384,8 +337,12 @@ void ConstrainedCholesky::addStiffness(double factor, const double* x, double* y
 
 void ConstrainedCholesky::multipliers(const double* r, double* mu) const
 {
-  if (in_rounds_)
-    return solveInRounds(r, nullptr, kRounds, nullptr, mu);
+  if (schur_ == Schur::none)
+  {
+    solveWhole(r, nullptr);
+    std::copy_n(whole_right_.data() + 4 * c_.cols(), 4 * count(), mu);
+    return;
+  }
   p_->forwardPoints(r, y_.data());
   v_.multiply(0.0, y_.data(), t_.data());
   inverse(t_.data(), mu_.data());

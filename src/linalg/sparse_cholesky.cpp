@@ -1,9 +1,11 @@
 #include "slender_sim/linalg/sparse_cholesky.h"
 
 #include <algorithm>
+#include <iterator>
 #include <mutex>
 #include <new>
 #include <numeric>
+#include <tuple>
 
 #include <suitesparse/cholmod.h>
 
@@ -91,12 +93,16 @@ struct SparseCholesky::Impl
     int at, column_length;   ///< of its first column, and of that column
     bool transposed, diagonal;
   };
+  cholmod_factor* analyse(std::vector<int>& pattern_starts, std::vector<int>& pattern_rows);
+  std::vector<int> orderOfPoints(const std::vector<int>& pattern_starts, const std::vector<int>& pattern_rows);
   void takeOrder();
+  std::vector<int> placesOfMultipliers() const;
   cholmod_sparse permutedView();
 
   std::vector<int> place;   ///< of each point (or, without points, unknown) in the order of elimination
   std::vector<Target> targets;
   int unknowns = 1;                 ///< per point
+  int multipliers = 0;              ///< the last points or, without points, unknowns
   cholmod_dense* right = nullptr;   ///< work space of solvePoints: for blocks
   PointVector permuted;             ///< for numbers
   SupernodalNumeric numeric;
@@ -117,18 +123,82 @@ SparseCholesky::~SparseCholesky() = default;
 SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 
-void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<int> rows)
+/// Analyses a pattern, with multipliers after the other unknowns of their constraints.
+cholmod_factor* SparseCholesky::Impl::analyse(std::vector<int>& pattern_starts, std::vector<int>& pattern_rows)
+{
+  cholmod_sparse a = patternView(pattern_starts, pattern_rows);
+  cholmod_factor* result = nullptr;
+  if (multipliers == 0)
+    result = cholmod_analyze(&a, &common);
+  else
+  {
+    std::vector<int> order = orderOfPoints(pattern_starts, pattern_rows);
+    const auto [methods, ordering, kind] = std::tuple(common.nmethods, common.method[0].ordering, common.supernodal);
+    common.nmethods = 1;
+    common.method[0].ordering = CHOLMOD_GIVEN;
+    common.supernodal = CHOLMOD_SUPERNODAL;
+    result = cholmod_analyze_p(&a, order.data(), nullptr, 0, &common);
+    common.nmethods = methods;
+    common.method[0].ordering = ordering;
+    common.supernodal = kind;
+  }
+  if (!result)
+    throw std::bad_alloc();
+  return result;
+}
+
+/// An order in which all unknowns but multipliers are eliminated with little fill. Each multiplier comes right after
+/// the last unknown of its constraint, where its pivot is negative if the matrix without multipliers is positive
+/// definite.
+std::vector<int> SparseCholesky::Impl::orderOfPoints(const std::vector<int>& pattern_starts,
+                                                     const std::vector<int>& pattern_rows)
+{
+  const int n = static_cast<int>(pattern_starts.size()) - 1, first = n - multipliers;
+  std::vector<int> own_starts{0}, own_rows, last(n, first - 1), order;
+  for (int j = 0; j < first; ++j)
+  {
+    std::copy_if(pattern_rows.begin() + pattern_starts[j], pattern_rows.begin() + pattern_starts[j + 1],
+                 std::back_inserter(own_rows), [first](int row) { return row < first; });
+    own_starts.push_back(static_cast<int>(own_rows.size()));
+  }
+  cholmod_sparse a = patternView(own_starts, own_rows);
+  cholmod_factor* analysed = cholmod_analyze(&a, &common);
+  if (!analysed)
+    throw std::bad_alloc();
+  const std::vector<int> points(static_cast<int*>(analysed->Perm), static_cast<int*>(analysed->Perm) + first);
+  cholmod_free_factor(&analysed, &common);
+  std::vector<std::vector<int>> after(first);   // multipliers, by the place of the last unknown
+  for (int k = 0; k < first; ++k)
+    for (int at = pattern_starts[points[k]]; at < pattern_starts[points[k] + 1]; ++at)
+      last[pattern_rows[at]] = k;
+  for (int multiplier = first; multiplier < n; ++multiplier)
+    after[last[multiplier]].push_back(multiplier);
+  for (int k = 0; k < first; ++k)
+  {
+    order.push_back(points[k]);
+    order.insert(order.end(), after[k].begin(), after[k].end());
+  }
+  return order;
+}
+
+/// In the order of elimination, ascending.
+std::vector<int> SparseCholesky::Impl::placesOfMultipliers() const
+{
+  std::vector<int> places(place.end() - multipliers, place.end());
+  std::sort(places.begin(), places.end());
+  return places;
+}
+
+void SparseCholesky::setPattern(int size, std::vector<int> starts, std::vector<int> rows, int multipliers)
 {
   Impl& m = *impl_;
+  m.multipliers = multipliers;
   m.starts = std::move(starts);
   m.rows = std::move(rows);
   m.starts.resize(size + 1);
   m.values.assign(m.rows.size(), 0.0);
   cholmod_free_factor(&m.factor, &m.common);
-  cholmod_sparse a = m.view();
-  m.factor = cholmod_analyze(&a, &m.common);
-  if (!m.factor)
-    throw std::bad_alloc();
+  m.factor = m.analyse(m.starts, m.rows);
   m.takeOrder();
 }
 
@@ -166,7 +236,7 @@ void SparseCholesky::Impl::takeOrder()
     return;
   if (!cholmod_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, factor, &common))
     throw std::bad_alloc();
-  numeric.setPattern(supernodes(), permuted_starts, permuted_rows);
+  numeric.setPattern(supernodes(), permuted_starts, permuted_rows, placesOfMultipliers());
 }
 
 /// The upper triangle in the order of elimination.
@@ -181,9 +251,9 @@ cholmod_sparse SparseCholesky::Impl::permutedView()
   return a;
 }
 
-void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3); }
+void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3, 0); }
 
-void SparseCholesky::setPattern(const PointMatrix& matrix)
+void SparseCholesky::setPattern(const PointMatrix& matrix, int multipliers)
 {
   std::vector<std::pair<int, int>> pairs;
   for (int i = 0; i < matrix.size(); ++i)
@@ -193,7 +263,7 @@ void SparseCholesky::setPattern(const PointMatrix& matrix)
   Eigen::MatrixXi edges(2, static_cast<Eigen::Index>(pairs.size()));
   for (std::size_t k = 0; k < pairs.size(); ++k)
     edges.col(static_cast<Eigen::Index>(k)) << pairs[k].first, pairs[k].second;
-  setPointPattern(BlockMatrix(matrix.size(), {edges}), 1);
+  setPointPattern(BlockMatrix(matrix.size(), {edges}), 1, multipliers);
   // entries of the lower triangle in the order of the rows, each to the target of its block
   const BlockMatrix pattern(matrix.size(), {edges});
   const std::vector<int> map = pattern.mapOf(matrix);
@@ -204,19 +274,17 @@ void SparseCholesky::setPattern(const PointMatrix& matrix)
   impl_->targets.swap(targets);
 }
 
-void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
+void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns, int multipliers)
 {
   Impl& m = *impl_;
+  m.multipliers = multipliers;
   const int points = pattern.points(), d = unknowns;
   // order of the points, postordered, by CHOLMOD's analysis of their graph
   std::vector<int> starts = pattern.starts(), rows = pattern.rows();
-  cholmod_sparse graph = Impl::patternView(starts, rows);
   m.common.nmethods = 1;
   m.common.method[0].ordering = CHOLMOD_METIS;
   m.common.postorder = 1;
-  cholmod_factor* order = cholmod_analyze(&graph, &m.common);
-  if (!order)
-    throw std::bad_alloc();
+  cholmod_factor* order = m.analyse(starts, rows);
   m.unknowns = d;
   m.place.resize(points);
   for (int k = 0; k < points; ++k)
@@ -278,7 +346,7 @@ void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
     m.right = cholmod_allocate_dense(d * points, 1, d * points, CHOLMOD_REAL, &m.common);
   if (!m.factor || (d != 1 && !m.right) || !cholmod_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, m.factor, &m.common))
     throw std::bad_alloc();
-  m.numeric.setPattern(m.supernodes(), m.starts, m.rows);
+  m.numeric.setPattern(m.supernodes(), m.starts, m.rows, m.placesOfMultipliers());
 }
 
 bool SparseCholesky::factor(const BlockMatrix& matrix, const char* fixed)
@@ -329,6 +397,8 @@ void SparseCholesky::solvePoints(const double* b, double* x) const
   if (m.unknowns == 1)
   {
     forwardPoints(b, m.permuted.data());
+    for (auto k = m.place.end() - m.multipliers; k < m.place.end(); ++k)
+      point(m.permuted, *k) *= -1.0;
     backwardPoints(m.permuted.data(), x);
     return;
   }
@@ -386,9 +456,24 @@ void SparseCholesky::solve(double* x) const
   b.x = m.permuted_right.data();
   b.xtype = CHOLMOD_REAL;
   b.dtype = CHOLMOD_DOUBLE;
-  cholmod_solve2(CHOLMOD_A, m.factor, &b, nullptr, &m.solution, nullptr, &m.work_y, &m.work_e, &m.common);
+  const auto solve = [&](int part) {
+    cholmod_solve2(part, m.factor, &b, nullptr, &m.solution, nullptr, &m.work_y, &m.work_e, &m.common);
+    return static_cast<const double*>(m.solution->x);
+  };
+  if (m.multipliers > 0)
+  {
+    std::copy_n(solve(CHOLMOD_L), size(), m.permuted_right.begin());
+    for (auto k = m.place.end() - m.multipliers; k < m.place.end(); ++k)
+      m.permuted_right[*k] *= -1.0;
+  }
+  const double* const solution = solve(m.multipliers > 0 ? CHOLMOD_Lt : CHOLMOD_A);
   for (int i = 0; i < size(); ++i)
-    x[i] = static_cast<const double*>(m.solution->x)[m.place[i]];
+    x[i] = solution[m.place[i]];
+}
+
+double SparseCholesky::pivot(int unknown) const
+{
+  return impl_->numeric.pivot(impl_->place[unknown], static_cast<const double*>(impl_->factor->x));
 }
 
 }   // namespace slender

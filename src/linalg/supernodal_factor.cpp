@@ -18,10 +18,11 @@ void dpotrf_(const char* uplo, const int* n, double* a, const int* lda, int* inf
 namespace slender {
 
 void SupernodalNumeric::setPattern(const SupernodalFactor& factor, const std::vector<int>& starts,
-                                   const std::vector<int>& matrix_rows)
+                                   const std::vector<int>& matrix_rows, const std::vector<int>& negative)
 {
   f_ = factor;
   starts_ = starts;
+  findRuns(negative);
   const int n = static_cast<int>(starts.size()) - 1;
   supernode_of_.assign(n, 0);
   place_.assign(n, 0);
@@ -54,6 +55,26 @@ void SupernodalNumeric::setPattern(const SupernodalFactor& factor, const std::ve
     v->assign(f_.supernodes, -1);
 }
 
+void SupernodalNumeric::findRuns(const std::vector<int>& negative)
+{
+  auto next = negative.begin();
+  runs_.clear();
+  first_run_.assign(1, 0);
+  for (int s = 0; s < f_.supernodes; ++s)
+  {
+    for (int j = 0; j < columns(s); ++j)
+    {
+      const bool is_negative = next != negative.end() && *next == f_.first[s] + j;
+      next += is_negative;
+      const double sign = is_negative ? -1.0 : 1.0;
+      if (j == 0 || runs_.back().sign != sign)
+        runs_.push_back({j, j, sign});
+      runs_.back().end = j + 1;
+    }
+    first_run_.push_back(static_cast<int>(runs_.size()));
+  }
+}
+
 /// Into the list of the supernode that row `row` of supernode s belongs to.
 void SupernodalNumeric::queue(int s, int row)
 {
@@ -65,7 +86,7 @@ void SupernodalNumeric::queue(int s, int row)
   head = s;
 }
 
-/// From the block of s the part of L L^T that a supernode before it makes there.
+/// From the block of s the part of L D L^T that a supernode before it makes there.
 void SupernodalNumeric::subtract(int descendant, int s, double* x)
 {
   const int* own = f_.rows + f_.row_starts[descendant];
@@ -73,14 +94,18 @@ void SupernodalNumeric::subtract(int descendant, int s, double* x)
   int end = begin;
   while (end < all && own[end] < f_.first[s + 1])
     ++end;
-  const int within = end - begin, length = all - begin, below = all - end, width = columns(descendant),
-            height = rows(s);
-  const double one = 1.0, zero = 0.0;
-  const double* block = x + f_.value_starts[descendant] + begin;
-  dsyrk_("L", "N", &within, &width, &one, block, &all, &zero, update_.data(), &length);
-  if (below > 0)
-    dgemm_("N", "C", &below, &within, &width, &one, block + within, &all, block, &all, &zero, update_.data() + within,
-           &length);
+  const int within = end - begin, length = all - begin, below = all - end, height = rows(s);
+  for (int r = first_run_[descendant]; r < first_run_[descendant + 1]; ++r)
+  {
+    const Run& run = runs_[r];
+    const int width = run.end - run.begin;
+    const double kept = r == first_run_[descendant] ? 0.0 : 1.0;
+    const double* block = x + f_.value_starts[descendant] + begin + static_cast<std::ptrdiff_t>(run.begin) * all;
+    dsyrk_("L", "N", &within, &width, &run.sign, block, &all, &kept, update_.data(), &length);
+    if (below > 0)
+      dgemm_("N", "C", &below, &within, &width, &run.sign, block + within, &all, block, &all, &kept,
+             update_.data() + within, &length);
+  }
   for (int i = 0; i < length; ++i)
     relative_[i] = place_[own[begin + i]];
   for (int j = 0; j < within; ++j)
@@ -96,19 +121,45 @@ void SupernodalNumeric::subtract(int descendant, int s, double* x)
 /// From the block of s, from which all updates have been subtracted, its columns of L.
 bool SupernodalNumeric::finish(int s, double* x) const
 {
-  const int width = columns(s), height = rows(s), below = height - width;
-  double* block = x + f_.value_starts[s];
+  for (int r = first_run_[s]; r < first_run_[s + 1]; ++r)
+    if (!factorRun(runs_[r], columns(s), rows(s), x + f_.value_starts[s]))
+      return false;
+  return true;
+}
+
+/// The columns of one run, whose part of L D L^T is then subtracted from the columns of the supernode after it.
+bool SupernodalNumeric::factorRun(const Run& run, int width, int height, double* block)
+{
+  const int count = run.end - run.begin, below = height - run.end, after = width - run.end, last = height - width;
+  double* const first = block + static_cast<std::ptrdiff_t>(run.begin) * (height + 1);
+  for (int j = 0; run.sign < 0.0 && j < count; ++j)
+    for (int i = j; i < height - run.begin; ++i)
+      first[static_cast<std::ptrdiff_t>(j) * height + i] *= -1.0;
   int info = 0;
-  dpotrf_("L", &width, block, &height, &info);
+  dpotrf_("L", &count, first, &height, &info);
   if (info != 0)
     return false;
-  for (int j = 0; j < width; ++j)   // not every LAPACK finds what is not finite
-    if (!std::isfinite(block[static_cast<std::ptrdiff_t>(j) * (height + 1)]))
+  for (int j = 0; j < count; ++j)   // not every LAPACK finds what is not finite
+    if (!std::isfinite(first[static_cast<std::ptrdiff_t>(j) * (height + 1)]))
       return false;
-  const double one = 1.0;
+  const double one = 1.0, minus = -run.sign;
   if (below > 0)
-    dtrsm_("R", "L", "C", "N", &below, &width, &one, block, &height, block + width, &height);
+    dtrsm_("R", "L", "C", "N", &below, &count, &one, first, &height, first + count, &height);
+  if (after == 0)
+    return true;
+  const double* const rest = first + count;
+  double* const next = block + static_cast<std::ptrdiff_t>(run.end) * (height + 1);
+  dsyrk_("L", "N", &after, &count, &minus, rest, &height, &one, next, &height);
+  if (last > 0)
+    dgemm_("N", "C", &last, &after, &count, &minus, rest + after, &height, rest, &height, &one, next + after, &height);
   return true;
+}
+
+double SupernodalNumeric::pivot(int column, const double* x) const
+{
+  const int s = supernode_of_[column], at = column - f_.first[s];
+  const double root = x[f_.value_starts[s] + static_cast<std::ptrdiff_t>(at) * (rows(s) + 1)];
+  return root * root;
 }
 
 bool SupernodalNumeric::factor(const double* values, double* x)

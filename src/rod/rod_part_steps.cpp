@@ -142,7 +142,7 @@ void RodPart::refuse(StepFailure failure, double length, StepReport& report) con
   if (dependent_)
     why =
         "prescribed averages depend on each other on the nodes that are not held: leave some out, or hold fewer nodes";
-  else if (averages_ && (coupled || !own_terms.empty()))
+  else if (averages_ && (welded_ || touched_ || failure == StepFailure::squeezed))
     why =
         "what the rod touches or is welded to may not let it have the averages of its guide: keep the guide clear of "
         "that, or let it move by less at once";

@@ -252,15 +252,15 @@ void PrintTo(const Other& other, std::ostream* out) { *out << other.name; }
 
 /// Lifts cloths that track a guide into what lies above. The averages stay exact. Only the forces of the guides change
 /// the total momentum, if there is no obstacle.
-void lift(const std::string& scene, bool touches)
+void lift(const std::string& scene, bool touches, const std::vector<std::string>& overrides = {}, int steps = 60)
 {
-  Simulation s(parseScene(scene, "lifted"));
+  Simulation s(parseScene(scene, "lifted", overrides));
   const bool isolated = s.config().obstacles.empty();
   SceneInputs inputs = s.defaultInputs();
   const std::vector<Matrix3Xd> guides = inputs.guides;
   std::size_t contacts = 0;
   double largest = 0.0;
-  for (int k = 0; k < 60; ++k)
+  for (int k = 0; k < steps; ++k)
   {
     inputs = s.defaultInputs();
     for (std::size_t c = 0; c < guides.size(); ++c)
@@ -320,6 +320,13 @@ INSTANTIATE_TEST_SUITE_P(EachKind, TrackedClothMeets,
                                          Other{"Cloth", kCloth}, Other{"Body", kBall}, Other{"Obstacle", kLid}),
                          [](const auto& info) { return std::string(info.param.name); });
 
+/// More than 1,500 multipliers, which are eliminated with the points of their averages.
+TEST(AverageConstraints, OfManyTestFunctionsAreExact)
+{
+  lift(kLiftedTowel + "rods:" + kRod, true,
+       {"tracked.towel.guide.grid.cells=26", "tracked.towel.test_functions.clusters.count=520"}, 20);
+}
+
 /// The guide presses the towel against a ceiling, and the work for it is bounded.
 TEST(AverageConstraints, OfAClothThatACeilingDoesNotAllowAreRefused)
 {
@@ -342,7 +349,7 @@ TEST(AverageConstraints, OfAClothThatACeilingDoesNotAllowAreRefused)
 }
 
 #ifdef SLENDER_COUNTS_ALLOCATIONS
-/// Steps with its own matrix and with the shared one, while the guide and contact move.
+/// Steps alone and beside a rod, while the guide and contact move.
 TEST(AverageConstraints, WarmStepsTakeNoMemory)
 {
   for (const std::string& scene : {kLifted, kLifted + kRod})

@@ -146,7 +146,9 @@ TEST(BoundedAverages, ChangeNothingWhereTheyAreNotReached)
       q(2, i) += 0.0005 * k * std::sin(6 * q(0, i));
     ASSERT_TRUE(free.step(one, q).ok);
     ASSERT_TRUE(bounded.step(two, q).ok);
-    ASSERT_TRUE(free.state.x == bounded.state.x && free.state.v == bounded.state.v) << k;
+    // rounding errors of another factorisation
+    ASSERT_LT((free.state.x - bounded.state.x).norm(), 1e-12 * free.state.x.norm()) << k;
+    ASSERT_LT((free.state.v - bounded.state.v).norm(), 1e-9 * free.state.v.norm()) << k;
     EXPECT_TRUE(bounded.state.at_bound.empty());
     // what balances the end of the step, and what its linear equations had: they differ as far as these are not linear
     EXPECT_LT((one.averageForces() - two.averageForces()).norm(), 0.1 * one.averageForces().norm()) << k;

@@ -122,6 +122,33 @@ TEST(ComponentCholesky, OneIndefiniteComponentIsEnough)
   }
 }
 
+TEST(ComponentCholesky, ComponentsHaveTheirMultipliers)
+{
+  Random random(5);
+  Matrix a(42);
+  for (int k = 0; k < 2; ++k)
+  {
+    a.addBand(random, k, 2, 20, 2);
+    for (int i = 3; i < 8; ++i)
+      a.dense(40 + k, 2 * i + k) = 1.0;
+    a.dense(40 + k, 40 + k) = -0.1;
+  }
+  a.list();
+  const Eigen::VectorXd b = Eigen::VectorXd::LinSpaced(42, 1.0, 2.0);
+  for (const bool simplicial : {false, true})
+  {
+    ComponentCholesky cholesky(simplicial);
+    for (const int multipliers : {2, 0, 2})   // The analyses of other numbers of multipliers are of no use.
+    {
+      cholesky.setPattern(a.starts, a.rows, multipliers);
+      EXPECT_EQ(cholesky.factor(a.values, busy(42), 2), multipliers == 2);
+    }
+    Eigen::VectorXd x = b;
+    cholesky.solve(x.data(), 2);
+    EXPECT_LT((a.dense.selfadjointView<Eigen::Lower>() * x - b).norm(), 1e-14 * b.norm());
+  }
+}
+
 /// Idle components are neither factored nor solved for, and come back when they are wanted.
 TEST(ComponentCholesky, LeavesIdleComponentsOut)
 {

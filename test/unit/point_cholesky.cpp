@@ -273,5 +273,84 @@ TEST(PointCholesky, SolvesThreeCoordinatesAtATime)
   }
 }
 
+/// The lower triangle of a dense matrix by columns, as SparseCholesky::setPattern() takes it, with its whole diagonal.
+struct Lower
+{
+  std::vector<int> starts{0}, rows;
+  std::vector<double> values;
+
+  explicit Lower(const MatrixXd& a)
+  {
+    for (Eigen::Index j = 0; j < a.cols(); ++j)
+    {
+      for (Eigen::Index i = j; i < a.rows(); ++i)
+        if (i == j || a(i, j) != 0.0)
+        {
+          rows.push_back(static_cast<int>(i));
+          values.push_back(a(i, j));
+        }
+      starts.push_back(static_cast<int>(rows.size()));
+    }
+  }
+};
+
+bool factorsAs(const MatrixXd& a, int multipliers)
+{
+  const Lower lower(a);
+  SparseCholesky factor;
+  factor.setPattern(static_cast<int>(a.rows()), lower.starts, lower.rows, multipliers);
+  std::copy(lower.values.begin(), lower.values.end(), factor.values());
+  return factor.factor();
+}
+
+/// Sums of a window of unknowns along a chain are prescribed, and one of two unknowns far apart.
+MatrixXd chainWithConstraints(int unknowns, int constraints, double least)
+{
+  const int n = unknowns + constraints;
+  MatrixXd a = MatrixXd::Zero(n, n);
+  for (int i = 0; i + 1 < unknowns; ++i)
+    a.block<2, 2>(i, i) += (1.0 + 0.1 * (i % 7)) * (MatrixXd(2, 2) << 1, -1, -1, 1).finished();
+  a.topLeftCorner(unknowns, unknowns).diagonal().array() += least;
+  for (int c = 0; c < constraints; ++c)
+    for (int i = 0; i < unknowns; ++i)
+      if (c == 0 ? i == 3 || i == unknowns - 2 : std::abs(i - c * unknowns / constraints) < 6)
+        a(unknowns + c, i) = a(i, unknowns + c) = 0.5 + 0.1 * (i % 3);
+  return a;
+}
+
+TEST(SparseCholesky, EliminatesMultipliersAfterTheirConstraints)
+{
+  constexpr int kUnknowns = 60, kConstraints = 8, n = kUnknowns + kConstraints;
+  const MatrixXd a = chainWithConstraints(kUnknowns, kConstraints, 1e-3);
+  const Lower lower(a);
+  SparseCholesky factor;
+  factor.setPattern(n, lower.starts, lower.rows, kConstraints);
+  Random random(8);
+  for (int pass = 0; pass < 2; ++pass)   // the second one with the analysis of the first
+  {
+    std::copy(lower.values.begin(), lower.values.end(), factor.values());
+    ASSERT_TRUE(factor.factor());
+    VectorXd right(n);
+    for (double& b : right)
+      b = random.uniform();
+    const VectorXd expected = a.partialPivLu().solve(right);
+    VectorXd x = right;
+    factor.solve(x.data());
+    EXPECT_LT((x - expected).norm(), 1e-11 * expected.norm());   // the condition of the chain is 4e3
+  }
+  // as many negative pivots as there are constraints, or none at all
+  EXPECT_FALSE(factorsAs(chainWithConstraints(kUnknowns, kConstraints, -0.5), kConstraints));
+  MatrixXd dependent = a;
+  dependent.row(n - 1) = dependent.row(n - 2);
+  dependent.col(n - 1) = dependent.col(n - 2);
+  EXPECT_FALSE(factorsAs(dependent, kConstraints));
+  MatrixXd empty = a;
+  empty.row(n - 1).setZero();
+  empty.col(n - 1).setZero();
+  EXPECT_FALSE(factorsAs(empty, kConstraints));
+  EXPECT_TRUE(factorsAs(a, kConstraints));
+  EXPECT_FALSE(factorsAs(a, 0));
+}
+
 }   // namespace
 }   // namespace slender::test

@@ -8,6 +8,11 @@
 namespace slender {
 
 /// Cholesky factorisation of sparse symmetric matrices whose pattern stays while their values change (CHOLMOD).
+///
+/// The last unknowns may be the multipliers of linear constraints C x = g on the others. Then the matrix is
+/// [K C^T; C 0], and it is factored as L D L^T with entries 1 and -1 in D. Each multiplier is eliminated right after
+/// the unknowns of its constraint, so that the factor is hardly larger than that of K where constraints are local. It
+/// exists if K is positive definite and constraints do not depend on each other.
 class SparseCholesky
 {
 public:
@@ -19,14 +24,15 @@ public:
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   /// Lower triangle by columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending, the
-  /// diagonal among them. Analyses the pattern (fill-reducing order); values() are zero afterwards.
-  void setPattern(int size, std::vector<int> starts, std::vector<int> rows);
+  /// diagonal among them. Analyses the pattern (fill-reducing order); values() are zero afterwards. `multipliers`: how
+  /// many of the last unknowns are multipliers; their diagonal entries are in the pattern. Not for `simplicial`.
+  void setPattern(int size, std::vector<int> starts, std::vector<int> rows, int multipliers = 0);
 
   /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by
   /// nested dissection of the graph of points (METIS), with the unknowns of a point next to each other and supernodes
   /// wider than CHOLMOD's; factoring and solving take no memory. values() is then not to be used.
   void setPattern(const BlockMatrix& matrix);
-  void setPattern(const PointMatrix& matrix);
+  void setPattern(const PointMatrix& matrix, int multipliers = 0);
   /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are
   /// those of the identity.
   bool factor(const BlockMatrix& matrix, const char* fixed);
@@ -35,8 +41,8 @@ public:
   bool factor(const PointMatrix& matrix, const double* values, const char* fixed);
   /// x = A^-1 b for points (4 doubles each; x may be b). Fixed points: x = b.
   void solvePoints(const double* b, double* x) const;
-  /// The two halves of solvePoints of a PointMatrix: y = L^-1 b, with y in the order of elimination and not b, and x =
-  /// L^-T y, which overwrites y.
+  /// The two halves of solvePoints of a PointMatrix without multipliers: y = L^-1 b, with y in the order of elimination
+  /// and not b, and x = L^-T y, which overwrites y.
   void forwardPoints(const double* b, double* y) const;
   void backwardPoints(double* y, double* x) const;
 
@@ -44,13 +50,16 @@ public:
   /// One per entry of the pattern.
   double* values();
 
-  /// False when the matrix is not positive definite (or not finite).
+  /// False when the matrix is not positive definite (or not finite); with multipliers when K is not, or constraints
+  /// depend on each other.
   bool factor();
   /// x := A^-1 x after a factor() that returned true.
   void solve(double* x) const;
+  /// Returns the size of an unknown's pivot in L D L^T. Not for `simplicial` and not for blocks.
+  double pivot(int unknown) const;
 
 private:
-  void setPointPattern(const BlockMatrix& pattern, int unknowns);
+  void setPointPattern(const BlockMatrix& pattern, int unknowns, int multipliers);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -185,7 +185,7 @@ std::optional<ContactProperties> readContactProperties(const YamlCursor& at, con
         "`barrier` makes contact a part of the step, so that cloth meets everything that has contact. `impulses` "
         "correct the end of the step: cheaper, but for cloth, obstacles and driven bodies only. Without the key: "
         "barrier if rods, threads, simulated bodies or another cloth with barrier have contact, otherwise impulses; a "
-        "cloth that has a max_traction or more than 500 test functions, or is a guide, always takes impulses.");
+        "cloth that has a max_traction or is a guide always takes impulses.");
   }
   return contact;
 }
