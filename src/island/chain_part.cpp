@@ -53,7 +53,6 @@ void ChainPart::addToPanels(const int (&point)[4], const double (&weight)[4], co
 /// Contacts with solids have no indefinite second derivatives, so that the whole of them goes into the band.
 void ChainPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
-  touched_ = false;
   const bool alone = !coupled && own_terms.empty();
   evaluation = alone ? system_.evaluate(with_hessian, shift) : system_.evaluateWhole(with_hessian);
   if (averages_)

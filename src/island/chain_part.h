@@ -62,7 +62,7 @@ protected:
   /// Per unknown of the chain, four per node: its number within the part, kPrescribed, or less where something else
   /// carries it.
   std::vector<int> dof_;
-  bool touched_ = false;   ///< by anything in the last evaluation
+  bool touched_ = false;   ///< by anything since the stage began
 
 private:
   template <class F>

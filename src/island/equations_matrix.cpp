@@ -152,7 +152,8 @@ void Equations::columnsOf(const ContactRow& contact, bool whole, Part::Columns& 
   }
 }
 
-/// Calls f for all parts that have averages, which are coupled, with the number of the first of their multipliers.
+/// Calls f(part, first) for each part that has averages. `first` is the number of its first multiplier. Such parts are
+/// always coupled.
 template <class F>
 void Equations::forAverages(F&& f) const
 {
@@ -165,8 +166,8 @@ void Equations::forAverages(F&& f) const
     }
 }
 
-/// Calls f for all entries of the averages' constraints on directions: with a multiplier, and what a component of a
-/// point's displacement adds to its row. If a body carries the point, these are unknowns of the body.
+/// Calls f(multiplier, row) for each component of each point of each average. `row` is what the component adds to the
+/// constraint of the multiplier. If a body carries the point, it has unknowns of the body.
 template <class F>
 void Equations::forConstraints(F&& f) const
 {

@@ -26,7 +26,8 @@ private:
   int after_ = 0, pause_ = 0;
 };
 
-/// The sparse symmetric matrix of unknowns that contacts or bodies couple, with its right-hand side and solution.
+/// The sparse symmetric matrix of unknowns that contacts, bodies or averages couple, with its right-hand side and
+/// solution.
 ///
 /// For one pattern: begin(), then what couples unknowns by note(), notePairs(), noteRows() and noteBases(), then
 /// finish(). What stays while contacts come and go is noted once: see keepNoted(). For one matrix: factor() with a
@@ -108,14 +109,15 @@ public:
   void addTurningTerm(const ContactTerm& term, const Bases& bases, const std::array<int, 2>& turns);
 
   /// Leaves unknowns out of factor() and solve() until the next finish(), or takes them in again. Either all unknowns
-  /// of a component of the matrix are idle, or none. Sweeps cannot leave unknowns out.
+  /// of a component of the matrix are idle, or none; multipliers need not be named. Sweeps cannot leave unknowns out.
   void setIdle(int first, int count, bool idle) { std::fill_n(idle_.begin() + first, count, idle); }
 
   /// Forgets that factorisations with whole second derivatives, or sweeps, have failed.
   void beginStage() { whole_ = swept_ = {}; }
   /// Factors what assemble(whole) makes: with the contacts' whole second derivatives where `contacts` says that there
   /// are any, that is due and leaves the matrix positive definite; else without those parts of them that may be
-  /// negative. Returns whether the matrix is positive definite.
+  /// negative. Returns whether the matrix is positive definite, see SparseCholesky::factor()
+  /// for multipliers.
   template <class Assemble>
   bool factor(bool contacts, Assemble&& assemble)
   {

@@ -75,8 +75,9 @@ bool ConstrainedCholesky::factor(const PointMatrix& pattern, const double* value
 
 bool ConstrainedCholesky::factorWhole(const PointMatrix& pattern, const double* values, const char* fixed)
 {
-  // A constraint depends on others if almost nothing is left of its pivot, over what it would have with P diagonal. The
-  // pivot's rounding error is some 1e-16 of what it has without the others, which may be 1e4 times as large.
+  // A constraint depends on others if its pivot is almost nothing, compared with what the pivot would be if P were
+  // diagonal and the constraint the only one (`gives`). The rounding error of a pivot is about 1e-16 of the pivot of
+  // the constraint alone, which may be 1e4 times `gives`.
   constexpr double kLeast = 1e-9;
   const int m = count(), n = pattern.size();
   std::vector<Eigen::Triplet<double>> entries;

@@ -155,6 +155,12 @@ std::vector<int> SparseCholesky::Impl::orderOfPoints(const std::vector<int>& pat
 {
   const int n = static_cast<int>(pattern_starts.size()) - 1, first = n - multipliers;
   std::vector<int> own_starts{0}, own_rows, last(n, first - 1), order;
+  if (first == 0)   // The matrix is zero.
+  {
+    order.resize(n);
+    std::iota(order.begin(), order.end(), 0);
+    return order;
+  }
   for (int j = 0; j < first; ++j)
   {
     std::copy_if(pattern_rows.begin() + pattern_starts[j], pattern_rows.begin() + pattern_starts[j + 1],

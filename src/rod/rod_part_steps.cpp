@@ -110,6 +110,7 @@ void RodPart::beginStage(std::size_t stage)
 {
   const Stage& now = rod_.plan->stages[stage];
   rod_.beginStage(stage);
+  touched_ = false;
   setCarriedInertia(now);
   followJoints();
   if (!averages_)

@@ -74,7 +74,7 @@ TEST(AverageConstraints, LeaveAFreeMotionAlone)
 {
   for (const std::string grasps : {"{}", "{left: {edges: [0]}}"})
   {
-    // contact that nothing meets: the rod solves with its own matrix, as it does alone
+    // Contact that nothing meets changes nothing.
     for (const std::string contact : {"", "{friction: 0.3}"})
     {
       std::vector<std::string> set = {"rods.0.grasps=" + grasps};
@@ -325,6 +325,44 @@ TEST(AverageConstraints, OfManyTestFunctionsAreExact)
 {
   lift(kLiftedTowel + "rods:" + kRod, true,
        {"tracked.towel.guide.grid.cells=26", "tracked.towel.test_functions.clusters.count=520"}, 20);
+}
+
+/// The pattern of the matrix has the averages that act.
+TEST(AverageConstraints, OfSetsThatChangeAreExact)
+{
+  lift(kLiftedTowel + "rods:" + kRod, true,
+       {"tracked.towel.test_functions=[{name: few, clusters: {count: 5}}, {name: many, clusters: {count: 9}, from: "
+        "0.02, "
+        "blend: 0.004}, {name: others, clusters: {count: 5, seed: 3}, from: 0.04, blend: 0.004}]"});
+}
+
+/// Two towels in one island, of which only one is lifted, into a rod.
+TEST(AverageConstraints, ATrackedClothRestsBesideOneThatMoves)
+{
+  std::string beside = kLiftedTowel.substr(kLiftedTowel.find("  - name: towel"));
+  beside.replace(beside.find("towel"), 5, "other").replace(beside.find("[-0.02, "), 8, "[0.0206, ");
+  Simulation alone(parseScene(kLiftedTowel + "rods:" + kRod, "lifted")),
+      both(parseScene(kLiftedTowel + beside + "rods:" + kRod, "lifted"));
+  const Matrix3Xd rest = both.state().cloths[1].x;
+  const auto lifted = [](const Simulation& s, int k) {
+    SceneInputs inputs = s.defaultInputs();
+    inputs.guides[0].row(2).array() += 5e-5 * (k + 1);
+    return inputs;
+  };
+  for (int k = 0; k < 30; ++k)
+  {
+    ASSERT_TRUE(alone.step(lifted(alone, k)).ok) << k;
+    ASSERT_TRUE(both.step(lifted(both, k)).ok) << k;
+    // One island has one stiffness of the barrier.
+    ASSERT_EQ(both.state().contact.cloths[0].stiffness, both.state().contact.cloths[1].stiffness) << k;
+    ASSERT_LT(both.trackingError({ObjectRef::cloth, 0}).met, 1e-10 * 0.04) << k;
+  }
+  EXPECT_FALSE(both.world().contacts().empty());
+  EXPECT_LT((both.state().cloths[1].x - rest).cwiseAbs().maxCoeff(), 1e-15);   // rounding errors
+  const Matrix3Xd &forces = both.state().cloth_guides[0].forces, &expected = alone.state().cloth_guides[0].forces;
+  EXPECT_LT(both.state().cloth_guides[1].forces.cwiseAbs().maxCoeff(), 1e-9 * forces.cwiseAbs().maxCoeff());
+  // Newton's method leaves up to this part of the largest force unbalanced.
+  EXPECT_LT((forces - expected).cwiseAbs().maxCoeff(), 1e-5 * forces.cwiseAbs().maxCoeff());
 }
 
 /// The guide presses the towel against a ceiling, and the work for it is bounded.

@@ -23,12 +23,12 @@ class ConstrainedCholesky
 public:
   using Constraints = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
-  /// Which parts of a solver to make.
+  /// What to compute besides what solve() needs.
   enum class Schur
   {
     none,
-    inverse,   ///< for addStiffness() and leaveOut() of nothing
-    bounded    ///< also for solveBounded(), leaveOut(), soften() and stiffness()
+    inverse,   ///< the dense S^-1, for addStiffness()
+    bounded    ///< S as well, for solveBounded(), leaveOut(), soften() and stiffness()
   };
   /// Constraints x points. Takes the memory of solve() and of what `schur` says.
   void setConstraints(const Constraints& c, Schur schur = Schur::none);

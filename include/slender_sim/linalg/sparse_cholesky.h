@@ -50,8 +50,9 @@ public:
   /// One per entry of the pattern.
   double* values();
 
-  /// False when the matrix is not positive definite (or not finite); with multipliers when K is not, or constraints
-  /// depend on each other.
+  /// False when the matrix is not positive definite (or not finite). With multipliers: true only if K is positive
+  /// definite for all x with C x = 0, false only if K is not positive definite or constraints depend on each other.
+  /// Rounding may hide that they do: see pivot().
   bool factor();
   /// x := A^-1 x after a factor() that returned true.
   void solve(double* x) const;

@@ -9,7 +9,6 @@
 
 #include "read_parts.h"
 #include "scene_text.h"
-#include "cloth/cloth_part.h"
 
 namespace slender {
 
