@@ -75,9 +75,9 @@ bool ConstrainedCholesky::factor(const PointMatrix& pattern, const double* value
 
 bool ConstrainedCholesky::factorWhole(const PointMatrix& pattern, const double* values, const char* fixed)
 {
-  // A constraint depends on others if its pivot is almost nothing, compared with what the pivot would be if P were
-  // diagonal and the constraint the only one (`gives`). The rounding error of a pivot is about 1e-16 of the pivot of
-  // the constraint alone, which may be 1e4 times `gives`.
+  // A constraint depends on others if its pivot is almost zero. The pivot is compared with `gives`, the pivot that the
+  // constraint would have if P were diagonal and there were no other constraint. The rounding error of a pivot is about
+  // 1e-16 of the pivot of the constraint alone, which may be 1e4 times `gives`.
   constexpr double kLeast = 1e-9;
   const int m = count(), n = pattern.size();
   std::vector<Eigen::Triplet<double>> entries;

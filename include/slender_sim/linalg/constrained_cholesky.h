@@ -12,12 +12,13 @@ namespace slender {
 
 /// Solves [P C^T; C 0] [z; mu] = [r; g] for the three coordinates of points alike, in one of two ways.
 ///
-/// Without the Schur complement the whole matrix is factored, see SparseCholesky. Time and memory then grow with points
-/// and constraints as those of the factor of P do.
+/// Schur::none: the whole matrix is factored, see SparseCholesky. Time and memory then grow with the number of points
+/// and constraints hardly faster than those of a factor of P.
 ///
-/// With the Schur complement, P = L L^T is given. With V = L^-1 C^T and S = V^T V, one solve costs one forward and one
-/// backward substitution, two products with V (sparse: constraints are local) and one with S^-1, which is dense. This
-/// way is for few constraints. Bounds of their forces, and stiffness along them, need S or its inverse.
+/// Otherwise the class takes the factor L of P = L L^T, which its caller has, and computes V = L^-1 C^T and the Schur
+/// complement S = V^T V. One solve costs one forward and one backward substitution, two products with V, which is
+/// sparse because constraints are local, and one product with S^-1, which is dense. This way suits few constraints.
+/// Bounds of the constraints' forces, and stiffness along the constraints, need S or its inverse.
 class ConstrainedCholesky
 {
 public:
@@ -36,8 +37,8 @@ public:
   /// C count as zero. False: constraints depend on each other.
   bool factor(const PointMatrix& pattern, const double* values, const SparseCholesky& p, const char* fixed);
 
-  /// Leaves constraints `rows` (ascending) out of all solves: their mu are rounding errors. None, and factor(): all
-  /// count.
+  /// Leaves the constraints `rows` (ascending) out of all solves, in which their mu are then rounding errors. After
+  /// factor(), and with an empty list, no constraint is left out. For Schur::bounded only.
   void leaveOut(const std::vector<int>& rows);
 
   int count() const { return static_cast<int>(c_.rows()); }
@@ -61,7 +62,7 @@ public:
   /// Makes solveSoftened() that of P + C^T diag(weights) C, weights positive.
   void soften(const Eigen::VectorXd& weights);
   void solveSoftened(const double* r, double* z) const;
-  /// Of one constraint when all others are met: entry of the diagonal of S^-1.
+  /// Returns the stiffness of one constraint while all others are met: an entry of the diagonal of S^-1.
   double stiffness(int i) const { return s_inverse_.values[static_cast<std::size_t>(i) * (count() + 1)]; }
   /// r += C^T f, but for fixed points.
   void addForces(const double* f, double* r) const;
@@ -70,7 +71,7 @@ public:
   /// y += factor C^T S^-1 C x, but for fixed points, where x must be zero: `factor` times as stiff along the
   /// constraints as P is.
   void addStiffness(double factor, const double* x, double* y) const;
-  /// mu alone, g zero.
+  /// Computes the mu of solve() with g = 0.
   void multipliers(const double* r, double* mu) const;
   /// r -= C^T mu, but for fixed points.
   void takeOut(const double* mu, double* r) const;

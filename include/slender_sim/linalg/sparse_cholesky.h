@@ -24,8 +24,9 @@ public:
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
 
   /// Lower triangle by columns: rows of column j are rows[starts[j]] .. rows[starts[j + 1] - 1], ascending, the
-  /// diagonal among them. Analyses the pattern (fill-reducing order); values() are zero afterwards. `multipliers`: how
-  /// many of the last unknowns are multipliers; their diagonal entries are in the pattern. Not for `simplicial`.
+  /// diagonal among them. Analyses the pattern (fill-reducing order); values() are zero afterwards. The last
+  /// `multipliers` unknowns are multipliers; the pattern has their diagonal entries. A `simplicial` factorisation takes
+  /// no multipliers.
   void setPattern(int size, std::vector<int> starts, std::vector<int> rows, int multipliers = 0);
 
   /// Likewise for the matrices of points: 3 x 3 blocks, or one number for all three coordinates. The order is found by
@@ -56,7 +57,7 @@ public:
   bool factor();
   /// x := A^-1 x after a factor() that returned true.
   void solve(double* x) const;
-  /// Returns the size of an unknown's pivot in L D L^T. Not for `simplicial` and not for blocks.
+  /// Returns the size of an unknown's pivot in L D L^T. Factorisations that are `simplicial` or of blocks have none.
   double pivot(int unknown) const;
 
 private:
