@@ -22,18 +22,19 @@ LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Mat
   AverageBounds& b = *bounds_;
   const Eigen::VectorXd& most = used_->prescribed->bounds;
   b.at.clear();
-  averages_->leaveOut(b.at);
+  used_->projection.leaveOut(b.at);
   if (at_bound.empty())
   {
     b.first_guess = d;
-    std::fill(b.taken.begin(), b.taken.end(), 0.0);
     const LinearOutcome outcome = solveTo(averages, d, linear_iterations);
     if (outcome != LinearOutcome::solved)
       return outcome;
+    setRight(d);
+    used_->projection.multipliers(right_, multipliers_);
     bool within = true;
-    for (int i = 0; i < averages_->count(); ++i)
+    for (int i = 0; i < count(); ++i)
     {
-      b.forces.col(i) = -point(b.taken, i);
+      b.forces.col(i) = -point(multipliers_, i);
       within = within && b.forces.col(i).norm() <= most[i];
     }
     if (within)
@@ -46,21 +47,21 @@ LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Mat
   // of what the bounds could do: forces far below them, of a shell at rest, are rounding errors
   constexpr double kSmall = 1e-6;
   double reference = 0.0;
-  for (int i = 0; i < averages_->count(); ++i)
+  for (int i = 0; i < count(); ++i)
     if (std::isfinite(most[i]))
-      reference = std::max(reference, kSmall * most[i] / std::sqrt(averages_->stiffness(i)));
+      reference = std::max(reference, kSmall * most[i] / std::sqrt(used_->bounded.stiffness(i)));
   LinearOutcome outcome = stepTowardsBounded(d, averages, reference, linear_iterations);
   if (outcome == LinearOutcome::not_converged)
     outcome = minimizeBounded(d, averages, reference, linear_iterations);
   at_bound.clear();
-  for (int i = 0; i < averages_->count(); ++i)
+  for (int i = 0; i < count(); ++i)
   {
     b.forces.col(i) = point(b.pulls, i);
     if (b.forces.col(i).norm() > (1.0 - 1e-9) * most[i])
       at_bound.push_back(i);
   }
   b.at = at_bound;
-  averages_->leaveOut(b.at);
+  used_->projection.leaveOut(b.at);
   return outcome;
 }
 
@@ -77,7 +78,7 @@ LinearOutcome AveragedClothSolver::stepTowardsBounded(PointVector& d, const Eige
   const Eigen::VectorXd& most = used_->prescribed->bounds;
   const PointKernels& kernels = pointKernels();
   const double tolerance = 1e-2 * linear_tolerance_;
-  const int m = averages_->count();
+  const int m = count();
   system_.applyMatrix(d, b.image);
   b.before = d;
   b.image_before = b.image;
@@ -103,8 +104,8 @@ LinearOutcome AveragedClothSolver::stepTowardsBounded(PointVector& d, const Eige
     bool exact = false;
     for (;; l *= 2.0)
     {
-      const ConstrainedCholesky::Norms norms = averages_->solveBounded(right_.data(), gap_.data(), most.data(), l,
-                                                                       tolerance, correction_.data(), b.pulls.data());
+      const ConstrainedCholesky::Norms norms = used_->bounded.solveBounded(
+          right_.data(), gap_.data(), most.data(), l, tolerance, correction_.data(), b.pulls.data());
       step = norms.step;
       exact = norms.converged;
       spend(1);
@@ -120,7 +121,7 @@ LinearOutcome AveragedClothSolver::stepTowardsBounded(PointVector& d, const Eige
     ++linear_iterations;
     if (budget_->spent() || stepsInterrupted())
       return LinearOutcome::not_converged;
-    averages_->addForces(b.pulls.data(), right_.data());
+    used_->bounded.addForces(b.pulls.data(), right_.data());
     double along = 0.0;
     for (std::size_t i = 0; i < d.size(); ++i)
     {
@@ -145,7 +146,7 @@ double AveragedClothSolver::boundedForces()
 {
   AverageBounds& b = *bounds_;
   double envelope = 0.0;
-  for (int i = 0; i < averages_->count(); ++i)
+  for (int i = 0; i < count(); ++i)
   {
     const double most = used_->prescribed->bounds[i], stiffness = b.stiffness[i];
     const Eigen::Vector3d wanted = point(b.pulls, i) + stiffness * point(gap_, i);
@@ -177,14 +178,14 @@ LinearResult AveragedClothSolver::solveBoundedStep(double tolerance, int most)
         system_.applyMatrix(p, ap);
         clearHeld(ap);
         averagesOf(p, averages_now_);
-        for (int i = 0; i < averages_->count(); ++i)   // a force at its bound only turns
+        for (int i = 0; i < count(); ++i)   // a force at its bound only turns
         {
           const Eigen::Vector3d n = point(b.wanted, i);
           point(b.response, i) = b.weights[i] * (averages_now_.col(i) - n.dot(averages_now_.col(i)) * n);
         }
-        averages_->addForces(b.response.data(), ap.data());
+        used_->bounded.addForces(b.response.data(), ap.data());
       },
-      [&](PointVector& r, PointVector& z) { averages_->solveSoftened(r.data(), z.data()); });
+      [&](PointVector& r, PointVector& z) { used_->bounded.solveSoftened(r.data(), z.data()); });
 }
 
 /// Moves d along the Newton step bounds_->before. A line search keeps the sum of the quadratic part and the envelope
@@ -232,9 +233,9 @@ LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::
   constexpr double kForcing = 0.05;   // of a Newton step's residual
   AverageBounds& b = *bounds_;
   const PointKernels& kernels = pointKernels();
-  const int m = averages_->count(), before = linear_iterations;
+  const int m = count(), before = linear_iterations;
   for (int i = 0; i < m; ++i)
-    b.stiffness[i] = kStiff * averages_->stiffness(i);
+    b.stiffness[i] = kStiff * used_->bounded.stiffness(i);
   system_.applyMatrix(d, b.image);
   for (int round = 0; round < kMostRounds; ++round)
   {
@@ -246,10 +247,10 @@ LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::
       for (std::size_t i = 0; i < d.size(); ++i)
         right_[i] = -system_.gradient()[i] - b.image[i];
       clearHeld(right_);
-      averages_->addForces(b.bounded.data(), right_.data());
-      averages_->soften(b.weights);
+      used_->bounded.addForces(b.bounded.data(), right_.data());
+      used_->bounded.soften(b.weights);
       budget_->spend(static_cast<long>(m) * m * m / kFlops);
-      averages_->solveSoftened(right_.data(), b.before.data());
+      used_->bounded.solveSoftened(right_.data(), b.before.data());
       const double left = std::sqrt(std::max(kernels.dot(points(), right_.data(), b.before.data()), 0.0)),
                    allowed = 0.5 * linear_tolerance_ * reference;
       if (!std::isfinite(left))
@@ -271,7 +272,7 @@ LinearOutcome AveragedClothSolver::minimizeBounded(PointVector& d, const Eigen::
       return LinearOutcome::not_converged;
     double change = 0.0;
     for (int i = 0; i < m; ++i)
-      change += (point(b.bounded, i) - point(b.pulls, i)).squaredNorm() / averages_->stiffness(i);
+      change += (point(b.bounded, i) - point(b.pulls, i)).squaredNorm() / used_->bounded.stiffness(i);
     std::copy(b.bounded.begin(), b.bounded.end(), b.pulls.begin());
     if (std::sqrt(change) <= linear_tolerance_ * reference)
       return LinearOutcome::solved;

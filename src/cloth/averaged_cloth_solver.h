@@ -1,12 +1,13 @@
 #pragma once
 
 #include "cloth_linear_solver.h"
+#include "linalg/projected_sweeps.h"
 #include "slender_sim/linalg/constrained_cholesky.h"
 
 namespace slender {
 
-/// Solves the Newton equations of a cloth with prescribed averages (see PrescribedAverages), by conjugate gradients.
-/// One set of the model's averages acts at a time.
+/// Solves the Newton equations of a cloth with prescribed averages (see PrescribedAverages), by ProjectedSweeps. One
+/// set of the model's averages acts at a time.
 class AveragedClothSolver final : public ClothLinearSolver
 {
 public:
@@ -17,15 +18,14 @@ public:
   void use(const ClothState& state);
   /// Whether the forces of averages have bounds.
   bool bounded() const { return bounds_ != nullptr; }
-  int count() const { return averages_->count(); }
+  int count() const { return used_->prescribed->count(); }
   /// False when averages depend on each other on what is not held: then nothing can be solved.
   bool independent() const { return used_->independent; }
   /// What they are at x.
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 
   void beginStage() override;
-  /// Averages stay what the first guess makes them; `at` is not used, because averages are met with the constant
-  /// matrix.
+  /// Averages stay what the first guess makes them.
   LinearOutcome solve(PointVector& d, const PointVector* at, long& linear_iterations, long& factorizations,
                       double tolerance = 0.0) override;
   /// The same, but the points x + d, x the start of the stage, get these averages (3 x count).
@@ -35,8 +35,7 @@ public:
   LinearOutcome solveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, std::vector<int>& at_bound,
                              long& linear_iterations);
 
-  /// Moves what is free, by as little as the preconditioner's norm allows, so that the averages are the given ones (3 x
-  /// count).
+  /// Moves what is free, by as little as its mass allows, so that the averages are the given ones (3 x count).
   void meetAverages(const Eigen::Matrix3Xd& averages, PointVector& x);
   /// Takes the part out of the system's gradient that the averages balance: their forces (3 x count). With bounds these
   /// are those of solveBounded(), and of the `response` to other forces those of averages that are not at their bounds.
@@ -45,17 +44,18 @@ public:
 private:
   struct AverageSet
   {
+    explicit AverageSet(const PrescribedAverages& of) : prescribed(&of), projection(*of.weights) {}
     const PrescribedAverages* prescribed;
-    ConstrainedCholesky solver;   ///< of the preconditioner
-    bool swept = false;           ///< sweepsSuit()
-    bool ready = false;           ///< factored, with the present one
-    bool independent = true;      ///< with what is held
+    AverageProjection projection;
+    ConstrainedCholesky bounded;   ///< of the preconditioner, with bounds only
+    bool factored = false;         ///< `bounded`, with the present one
+    bool independent = true;       ///< with what is held
   };
   struct AverageBounds
   {
-    std::vector<int> at;        ///< averages that are not met because their forces are at their bounds, ascending
-    Eigen::Matrix3Xd forces;    ///< of all [N]
-    PointVector taken, pulls;   ///< multipliers of the averages that are met, so far; forces of all
+    std::vector<int> at;       ///< averages that are not met because their forces are at their bounds, ascending
+    Eigen::Matrix3Xd forces;   ///< of all [N]
+    PointVector pulls;         ///< forces of all
     PointVector first_guess, before, image, image_before;
     /// of minimizeBounded(): directions of forces at their bounds, else zero; forces; what they are to a motion
     PointVector wanted, bounded, response;
@@ -63,19 +63,9 @@ private:
   };
 
   void use(AverageSet& set);
-  /// `averages` null: these stay.
-  LinearOutcome solveMeeting(const Eigen::Matrix3Xd* averages, PointVector& d, long& linear_iterations,
-                             double tolerance);
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
-  void preconditionWithin(PointVector& r, PointVector& z);
-  double takeFirstStep(PointVector& d, const Eigen::Matrix3Xd* averages, double tolerance);
-  void move(PointVector& d);
-  void moveAverages(PointVector& d);
-  bool sweepsSuit(const PrescribedAverages& averages) const;
-  bool bendsLittle() const;
-  LinearOutcome sweepWithAverages(PointVector& d, const Eigen::Matrix3Xd& averages, double tolerance,
-                                  long& linear_iterations);
+  LinearOutcome search(PointVector& d, double tolerance, double load, long& linear_iterations);
   LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference,
                                    long& linear_iterations);
   LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,
@@ -84,18 +74,15 @@ private:
   void setBoundedGap(const PointVector& d, const Eigen::Matrix3Xd& averages);
   LinearResult solveBoundedStep(double tolerance, int most);
   double moveBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double start);
-  void takeOutAverages(PointVector& r);
 
-  const bool choose_;   ///< the solver of steps with averages is ours to choose
-  bool limp_ = true;    ///< bendsLittle(): sweeps are not too slow
+  const Eigen::VectorXd& mass_;
   std::vector<AverageSet> average_sets_;
-  AverageSet* used_ = nullptr;                ///< of these, and
-  ConstrainedCholesky* averages_ = nullptr;   ///< its solver
-  PointVector gap_, multipliers_;             ///< one point per average
+  AverageSet* used_ = nullptr;   ///< of these
+  ProjectedSweeps sweeps_;
+  std::vector<char> swept_held_;    ///< what was held when sweeps_ took the averages
+  PointVector gap_, multipliers_;   ///< one point per average
   Eigen::Matrix3Xd averages_now_;
   std::unique_ptr<AverageBounds> bounds_;   ///< of models with bounds
-  double load_ = 0;                         ///< on the cloth without averages, as the tolerance counts it
-  double first_step_ = 0;                   ///< of takeFirstStep(), in the preconditioner's norm
 };
 
 }   // namespace slender

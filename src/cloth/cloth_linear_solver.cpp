@@ -9,29 +9,35 @@ constexpr double kBesideLoad = 1e-2;
 
 }   // namespace
 
-ClothSolver solverOf(const ClothModel& model, const ClothOptions& options)
+ClothSolver solverOf(const ClothOptions& options)
 {
-  if (options.solver != ClothSolver::automatic)
-    return options.solver;
-  return model.averages.empty() ? ClothSolver::gauss_seidel : ClothSolver::conjugate_gradients;
+  return options.solver == ClothSolver::automatic ? ClothSolver::gauss_seidel : options.solver;
 }
 
 ClothLinearSolver::ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system)
-  : system_(system),
-    linear_tolerance_(options.linear_tolerance),
-    kind_(solverOf(model, options))
+  : ClothLinearSolver(options, system)
 {
   if (kind_ == ClothSolver::cholesky)
     factor_.setPattern(system.matrix());
   else if (kind_ == ClothSolver::gauss_seidel)
     sweeps_.setPattern(system.matrix(), system.constantMatrix());
   else
-  {
-    preconditioner_ = std::make_unique<ClothPreconditioner>(model, system.terms(), system.matrix());
-    cg_.resize(4 * static_cast<std::size_t>(points()));
-  }
+    usePreconditioner(model);
+}
+
+ClothLinearSolver::ClothLinearSolver(const ClothOptions& options, ClothSystem& system)
+  : system_(system),
+    linear_tolerance_(options.linear_tolerance),
+    kind_(solverOf(options))
+{
   for (PointVector* v : {&right_, &product_, &correction_})
     v->assign(4 * static_cast<std::size_t>(points()), 0.0);
+}
+
+void ClothLinearSolver::usePreconditioner(const ClothModel& model)
+{
+  preconditioner_ = std::make_unique<ClothPreconditioner>(model, system_.terms(), system_.matrix());
+  cg_.resize(4 * static_cast<std::size_t>(points()));
 }
 
 bool ClothLinearSolver::updatePreconditioner()
@@ -106,7 +112,12 @@ LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, lo
     preconditioner_->align(*at, system_.matrix(), held);
   else
     preconditioner_->useConstant();
-  const LinearResult result = search(allowed, [&](PointVector& r, PointVector& z) { preconditioner_->apply(r, z); });
+  const auto apply = [this](const PointVector& p, PointVector& ap) {
+    system_.applyMatrix(p, ap);
+    clearHeld(ap);
+  };
+  const LinearResult result = cg_.solve(right_, correction_, allowed, iterationsWithin(kMostLinearIterations), apply,
+                                        [&](PointVector& r, PointVector& z) { preconditioner_->apply(r, z); });
   return correct(d, result, allowed, 0.0, linear_iterations);
 }
 

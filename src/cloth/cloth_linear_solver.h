@@ -20,8 +20,8 @@ enum class LinearOutcome
   not_converged   ///< the most iterations that are taken did not reach the tolerance
 };
 
-/// The solver that the options mean for this cloth: never `automatic`.
-ClothSolver solverOf(const ClothModel& model, const ClothOptions& options);
+/// The solver that the options mean: never `automatic`.
+ClothSolver solverOf(const ClothOptions& options);
 
 /// Solves the Newton equations H d = -gradient of a ClothSystem, with what is held moving as given. Without prescribed
 /// averages; AveragedClothSolver is for those.
@@ -50,6 +50,10 @@ public:
                               double tolerance = 0.0);
 
 protected:
+  /// For solvers of their own.
+  ClothLinearSolver(const ClothOptions& options, ClothSystem& system);
+  void usePreconditioner(const ClothModel& model);
+
   static constexpr int kMostLinearIterations = 2000;   ///< of conjugate gradients
 
   int points() const { return system_.points(); }
@@ -58,17 +62,6 @@ protected:
   void clearHeld(PointVector& v) const;
   /// right_: what d leaves of the equations, held points zero.
   void setRight(const PointVector& d);
-  /// Solves for correction_ by conjugate gradients with right_. `reference`: as ConjugateGradients::solve().
-  template <class Precondition>
-  LinearResult search(double tolerance, const Precondition& precondition, double reference = 0.0)
-  {
-    const auto apply = [this](const PointVector& p, PointVector& ap) {
-      system_.applyMatrix(p, ap);
-      clearHeld(ap);
-    };
-    return cg_.solve(right_, correction_, tolerance, iterationsWithin(kMostLinearIterations), apply, precondition,
-                     reference);
-  }
   /// Adds correction_, the solution of conjugate gradients, to d. `load`: what is strained so much that little is left
   /// beside this load is solved to a share of it.
   LinearOutcome correct(PointVector& d, const LinearResult& result, double tolerance, double load,
@@ -88,12 +81,12 @@ protected:
   std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
   bool preconditioned_ = true;                            ///< its constant part could be factored
   ConjugateGradients cg_;
-  SymmetricSweeps sweeps_;
   PointVector right_, product_, correction_;
 
 private:
   const ClothSolver kind_;
   SparseCholesky factor_;   ///< of the system's matrix
+  SymmetricSweeps sweeps_;
   /// What the preconditioner was made for.
   std::vector<double> weights_;
   std::vector<char> held_;

@@ -44,8 +44,8 @@ ClothWork::ClothWork(std::shared_ptr<const ClothModel> m, const ClothOptions& o,
       throw std::invalid_argument(who + "a set of averages is empty: leave it out");
     if (o.integrator != Integrator::implicit_euler)
       throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
-    if (o.solver == ClothSolver::cholesky || o.solver == ClothSolver::gauss_seidel)
-      throw std::invalid_argument(who + "prescribed averages need solver: conjugate_gradients (or auto)");
+    if (o.solver == ClothSolver::cholesky || o.solver == ClothSolver::conjugate_gradients)
+      throw std::invalid_argument(who + "prescribed averages need solver.linear: gauss_seidel (or auto)");
     if ((set.bounds.size() > 0) != (model->averages[0].bounds.size() > 0))
       throw std::invalid_argument(who +
                                   "bounds of forces are for all sets of averages or for none (infinite: without)");
@@ -70,11 +70,11 @@ ClothWork::ClothWork(std::shared_ptr<const ClothModel> m, const ClothOptions& o,
 
 void ClothWork::buildSystem(const ClothModel& of)
 {
-  const ClothSolver kind = solverOf(of, options);
+  const ClothSolver kind = solverOf(options);
   linear.reset();
   system = std::make_unique<ClothSystem>(of, kind == ClothSolver::cholesky);
   averages = nullptr;
-  if (of.averages.empty() || !with_averages_ || kind != ClothSolver::conjugate_gradients)
+  if (of.averages.empty() || !with_averages_)
     linear = std::make_unique<ClothLinearSolver>(of, options, *system);
   else
   {

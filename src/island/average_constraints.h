@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 
-#include "island/average_projection.h"
+#include "linalg/average_projection.h"
 
 namespace slender {
 
@@ -49,13 +49,11 @@ public:
     forEntries([&](Eigen::Index i, int point, double weight) { gap_.col(i) -= weight * position(point); });
     if (gap_.cwiseAbs().maxCoeff() <= kRounding * at_.cwiseAbs().maxCoeff())
       return;
-    for (int k = 0; k < 3; ++k)
-    {
-      const Eigen::VectorXd& moved = projection_.displacements(gap_.row(k).transpose());
-      for (int j = 0; j < static_cast<int>(moved.size()); ++j)
-        if (moved[j] != 0.0)
-          shift(j, k, moved[j]);
-    }
+    const PointVector& moved = projection_.displacements(gap_);
+    for (int j = 0; j < static_cast<int>(c_.cols()); ++j)
+      for (int k = 0; k < 3; ++k)
+        if (moved[4 * static_cast<std::size_t>(j) + k] != 0.0)
+          shift(j, k, moved[4 * static_cast<std::size_t>(j) + k]);
   }
 
   /// Calls f(average, point, weight) for all entries of C.

@@ -210,7 +210,86 @@ void turn(int points, double beta, const Scalar* z, Scalar* p)
 }
 
 template <class Scalar>
-constexpr SweepKernels<Scalar> kSweeps = {sweepUp<Scalar>, sweepDown<Scalar>, advance<Scalar>, turn<Scalar>};
+void precondition(const SweptMatrix<Scalar>& m, Scalar* z)
+{
+  int k = 0;
+  for (int j = 0; j < m.points; ++j)
+  {
+    const Four<Scalar> solved = four(z + 4 * j) = times(m.inverse + 12 * static_cast<long>(j), 4, four(z + 4 * j));
+    for (const int end = m.starts[j + 1]; k < end; ++k)
+      four(z + 4 * m.rows[k]) -= times(m.blocks + 9 * static_cast<long>(k), 3, solved);
+  }
+  for (int j = m.points; j-- > 0;)
+  {
+    TransposedProduct<Scalar> below;
+    for (const int end = m.starts[j]; k > end;)
+    {
+      --k;
+      below.add(m.blocks + 9 * static_cast<long>(k), four(z + 4 * m.rows[k]));
+    }
+    four(z + 4 * j) -= times(m.inverse + 12 * static_cast<long>(j), 4, below.sum());
+  }
+}
+
+template <class Scalar>
+double multiplySwept(const SweptMatrix<Scalar>& m, const Scalar* x, Scalar* y)
+{
+  Quad form = {};
+  int k = 0;
+  for (int j = 0; j < m.points; ++j)
+  {
+    const Four<Scalar> own = four(x + 4 * j);
+    TransposedProduct<Scalar> below;
+    for (const int end = m.starts[j + 1]; k < end; ++k)
+    {
+      const Scalar* block = m.blocks + 9 * static_cast<long>(k);
+      four(y + 4 * m.rows[k]) += times(block, 3, own);
+      below.add(block, four(x + 4 * m.rows[k]));
+    }
+    const Four<Scalar> product = four(y + 4 * j) += times(m.diagonal + 12 * static_cast<long>(j), 4, own) + below.sum();
+    addProducts<Scalar>(own, product, form);
+  }
+  return form[0] + form[1] + form[2];
+}
+
+template <class Scalar>
+void addRows(const PointRows<Scalar>& c, double factor, const Scalar* x, Scalar* y)
+{
+  const Scalar share = static_cast<Scalar>(factor);
+  int k = 0;
+  for (int i = 0; i < c.rows; ++i)
+  {
+    Four<Scalar> sum = {};
+    for (const int end = c.starts[i + 1]; k < end; ++k)
+      sum += c.values[k] * four(x + 4 * c.columns[k]);
+    four(y + 4 * i) += share * sum;
+  }
+}
+
+template <class Scalar>
+void move(int points, double alpha, const Scalar* p, const Scalar* q, Scalar* x, Scalar* r, Scalar* z)
+{
+  const Scalar length = static_cast<Scalar>(alpha);
+  for (long j = 0; j < points; ++j)
+  {
+    four(x + 4 * j) += length * four(p + 4 * j);
+    four(z + 4 * j) = four(r + 4 * j) -= length * four(q + 4 * j);
+  }
+}
+
+template <class Scalar>
+double dotSwept(int points, const Scalar* x, const Scalar* y)
+{
+  Quad form = {};
+  for (long j = 0; j < points; ++j)
+    addProducts<Scalar>(four(x + 4 * j), four(y + 4 * j), form);
+  return form[0] + form[1] + form[2];
+}
+
+template <class Scalar>
+constexpr SweepKernels<Scalar> kSweeps = {sweepUp<Scalar>, sweepDown<Scalar>,    advance<Scalar>,
+                                          turn<Scalar>,    precondition<Scalar>, multiplySwept<Scalar>,
+                                          addRows<Scalar>, move<Scalar>,         dotSwept<Scalar>};
 
 /// Columns from .. from+Columns-1 of a supernode of `count` rows, whose first row is that of column 0: solve with the
 /// triangle, then take their part from the rows below.

@@ -3,7 +3,28 @@
 #include <algorithm>
 #include <numeric>
 
+#include <Eigen/LU>
+
 namespace slender {
+
+namespace {
+
+template <class Scalar>
+void putBlock(const Eigen::Matrix3d& block, int stride, Scalar* to)
+{
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r)
+      to[stride * c + r] = static_cast<Scalar>(block(r, c));
+}
+
+}   // namespace
+
+double largestEntry(const PointVector& v)
+{
+  return v.empty()
+             ? 0.0
+             : Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())).cwiseAbs().maxCoeff();
+}
 
 void SweptBlocks::orderPoints()
 {
@@ -89,6 +110,35 @@ Eigen::Matrix3d SweptBlocks::diagonal(int visit) const
     block.diagonal().array() += factor_ * b_->values()[b_diagonal_[visit]];
   return block;
 }
+
+template <class Scalar>
+void SweptBlocks::pack(SweptValues<Scalar>& values, Deflation* deflation) const
+{
+  values.blocks.resize(9 * rows_.size() + 3);   // three more, for wide loads
+  values.diagonal.resize(12 * order_.size());
+  values.inverse.resize(12 * order_.size());
+  const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
+  for (int v = 0; v < points(); ++v)
+  {
+    const Eigen::Matrix3d own = diagonal(v);
+    putBlock(isHeld(v) ? zero : own, 4, values.diagonal.data() + 12 * static_cast<std::size_t>(v));
+    putBlock(isHeld(v) ? zero : Eigen::Matrix3d(own.inverse()), 4,
+             values.inverse.data() + 12 * static_cast<std::size_t>(v));
+    if (deflation)
+      deflation->addDiagonal(v, own);
+    for (int k = starts_[v]; k < starts_[v + 1]; ++k)
+    {
+      const Eigen::Matrix3d between = block(k);
+      putBlock(isHeld(v) || isHeld(rows_[k]) ? zero : between, 3,
+               values.blocks.data() + 9 * static_cast<std::size_t>(k));
+      if (deflation)
+        deflation->add(k, rows_[k], v, between);
+    }
+  }
+}
+
+template void SweptBlocks::pack(SweptValues<float>&, Deflation*) const;
+template void SweptBlocks::pack(SweptValues<double>&, Deflation*) const;
 
 void SweptBlocks::multiply(const PointVector& x, PointVector& product) const
 {

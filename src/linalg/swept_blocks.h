@@ -2,9 +2,21 @@
 
 #include <vector>
 
+#include "linalg/deflation.h"
 #include "slender_sim/linalg/block_matrix.h"
+#include "slender_sim/linalg/point_kernel.h"
 
 namespace slender {
+
+/// The largest size of a number, 0 of none.
+double largestEntry(const PointVector& v);
+
+/// The numbers of a SweptMatrix.
+template <class Scalar>
+struct SweptValues
+{
+  AlignedVector<Scalar> blocks, diagonal, inverse;
+};
 
 /// The matrix A + factor B of SymmetricSweeps in the order in which sweeps visit its points. Each point comes after its
 /// neighbours of lower number, so that points visited in turn seldom wait for each other. `visit` is the number of a
@@ -31,6 +43,17 @@ public:
   /// A block of the lower triangle; `entry` counts as rows() do.
   Eigen::Matrix3d block(int entry) const;
   Eigen::Matrix3d diagonal(int visit) const;
+  /// Copies the matrix, and adds it to `deflation` (null: none) after its begin(). In `values` the blocks of held
+  /// points are zero.
+  template <class Scalar>
+  void pack(SweptValues<Scalar>& values, Deflation* deflation) const;
+  /// `values`: of pack().
+  template <class Scalar>
+  SweptMatrix<Scalar> matrixOf(const SweptValues<Scalar>& values) const
+  {
+    return {
+        points(), starts_.data(), rows_.data(), values.blocks.data(), values.diagonal.data(), values.inverse.data()};
+  }
   /// product := (A + factor B) x, both in the order of A.
   void multiply(const PointVector& x, PointVector& product) const;
 

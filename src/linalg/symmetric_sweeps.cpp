@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/LU>
-
 #include "slender_sim/linalg/flush_denormals.h"
 #include "slender_sim/linalg/interruption.h"
 
@@ -13,24 +11,9 @@ namespace slender {
 
 namespace {
 
-template <class Scalar>
-void putBlock(const Eigen::Matrix3d& block, int stride, Scalar* to)
-{
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r)
-      to[stride * c + r] = static_cast<Scalar>(block(r, c));
-}
-
 double squareOf(const PointVector& v)
 {
   return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())).squaredNorm();
-}
-
-double largest(const PointVector& v)
-{
-  return v.empty()
-             ? 0.0
-             : Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())).cwiseAbs().maxCoeff();
 }
 
 }   // namespace
@@ -45,36 +28,13 @@ void SymmetricSweeps::setPattern(const BlockMatrix& a, const PointMatrix* b)
     v->assign(4 * static_cast<std::size_t>(deflation_.groups()), 0.0);
 }
 
-double SymmetricSweeps::norm(const PointVector& r)
-{
-  pack(double_, false);
-  blocks_.toVisits(r, right_);
-  return normOf(double_, right_);
-}
-
-/// Takes over the values of the matrix, for deflated searches also into deflation_.
+/// Takes over the values of the matrix, also into deflation_.
 template <class Scalar>
-void SymmetricSweeps::pack(Search<Scalar>& s, bool deflated)
+void SymmetricSweeps::pack(Search<Scalar>& s)
 {
-  const std::vector<int>&starts = blocks_.starts(), &rows = blocks_.rows();
-  s.resize(blocks_.points(), rows.size());
-  for (int v = 0; v < blocks_.points(); ++v)
-  {
-    const Eigen::Matrix3d diagonal = blocks_.diagonal(v);
-    const bool held = blocks_.isHeld(v);
-    putBlock(held ? Eigen::Matrix3d::Zero().eval() : diagonal, 4, s.diagonal.data() + 12 * static_cast<std::size_t>(v));
-    putBlock(held ? Eigen::Matrix3d::Zero().eval() : diagonal.inverse().eval(), 4,
-             s.inverse.data() + 12 * static_cast<std::size_t>(v));
-    if (deflated)
-      deflation_.addDiagonal(v, diagonal);
-    for (int k = starts[v]; k < starts[v + 1]; ++k)
-    {
-      const Eigen::Matrix3d block = blocks_.block(k);
-      putBlock(block, 3, s.blocks.data() + 9 * static_cast<std::size_t>(k));
-      if (deflated)
-        deflation_.add(k, rows[k], v, block);
-    }
-  }
+  blocks_.pack(s.matrix, &deflation_);
+  for (AlignedVector<Scalar>* v : {&s.x, &s.r, &s.z, &s.p, &s.t, &s.q})
+    v->assign(4 * static_cast<std::size_t>(blocks_.points()), Scalar(0));
 }
 
 /// residual_ := right_ - (A + factor B) solution_, and x := solution_.
@@ -97,8 +57,9 @@ double SymmetricSweeps::load(Search<Scalar>& s, const PointVector& from, double 
   for (int v = 0; v < blocks_.points(); ++v)
     for (int c = 0; c < 3; ++c)
       s.q[4 * v + c] = blocks_.isHeld(v) ? Scalar(0) : static_cast<Scalar>(from[4 * v + c] / size);
-  kernels.down(matrixOf(s), {}, s.r.data(), s.t.data(), s.q.data());
-  const double square = kernels.advance(matrixOf(s), -1.0, s.t.data(), s.q.data(), s.x.data(), s.r.data(), s.z.data());
+  kernels.down(blocks_.matrixOf(s.matrix), {}, s.r.data(), s.t.data(), s.q.data());
+  const double square =
+      kernels.advance(blocks_.matrixOf(s.matrix), -1.0, s.t.data(), s.q.data(), s.x.data(), s.r.data(), s.z.data());
   s.p = s.z;
   return square;
 }
@@ -107,7 +68,7 @@ double SymmetricSweeps::load(Search<Scalar>& s, const PointVector& from, double 
 template <class Scalar>
 double SymmetricSweeps::normOf(Search<Scalar>& s, const PointVector& r)
 {
-  const double size = largest(r);
+  const double size = largestEntry(r);
   if (size == 0)
     return 0.0;
   const double square = load(s, r, size);
@@ -126,7 +87,7 @@ void SymmetricSweeps::deflate(Search<Scalar>& s)
 /// Iterates from what load() has left, until the norm is `tolerance` times `scale`. In the norm of D, the matrix is
 /// (D + L)^-1 A (D + L^T)^-1, and its product with p is t + (D + L)^-1 (p - D t) with t = (D + L^T)^-1 p, where
 /// p - D t = L^T t. The downward sweep subtracts from this L^T t the forces B c of the common motions c of `groups`.
-/// `between` is called before it: it sets c, or it adds the product of t with what a larger matrix has beside A.
+/// `between` is called before it and sets c.
 /// `advanced` is called after each step along t.
 template <class Scalar, class Between, class Advanced>
 SymmetricSweeps::SearchEnd SymmetricSweeps::iterate(Search<Scalar>& s, const GroupBlocks<Scalar>& groups, double square,
@@ -134,7 +95,7 @@ SymmetricSweeps::SearchEnd SymmetricSweeps::iterate(Search<Scalar>& s, const Gro
                                                     LinearResult& result, Between&& between, Advanced&& advanced)
 {
   const SweepKernels<Scalar>& kernels = pointKernels().sweeps<Scalar>();
-  const SweptMatrix<Scalar> matrix = matrixOf(s);
+  const SweptMatrix<Scalar> matrix = blocks_.matrixOf(s.matrix);
   double norm = std::sqrt(square) / scale;
   for (; norm > tolerance && result.iterations < max_iterations && !stepsInterrupted(); ++result.iterations)
   {
@@ -166,7 +127,7 @@ SymmetricSweeps::SearchEnd SymmetricSweeps::negative(const Search<Scalar>& s, do
   for (std::size_t v = 0; v < s.p.size() / 4; ++v)
     for (int c = 0; c < 3; ++c)
       for (int r = 0; r < 3; ++r)
-        sum += static_cast<double>(s.p[4 * v + r]) * s.inverse[12 * v + 4 * c + r] * s.p[4 * v + c];
+        sum += static_cast<double>(s.p[4 * v + r]) * s.matrix.inverse[12 * v + 4 * c + r] * s.p[4 * v + c];
   // `sum` is p . D^-1 p, the square of the norm of the direction p.
   return curvature < -Search<Scalar>::kLeast * sum ? SearchEnd::not_definite : SearchEnd::stalled;
 }
@@ -188,7 +149,7 @@ SymmetricSweeps::SearchEnd SymmetricSweeps::refine(Search<Scalar>& s, PointVecto
   for (double before = std::numeric_limits<double>::infinity();;)
   {
     deflation_.correct(residual_, solution_);
-    const double size = largest(residual_), square = size > 0 ? load(s, residual_, size) : 0.0;
+    const double size = largestEntry(residual_), square = size > 0 ? load(s, residual_, size) : 0.0;
     if (!(square >= 0))
       return negative(s, square);
     result.residual = std::sqrt(square) * size / result.scale;
@@ -224,7 +185,7 @@ template <class Scalar>
 bool SymmetricSweeps::begin(Search<Scalar>& s, LinearResult& result)
 {
   deflation_.begin(blocks_.moves());
-  pack(s, true);
+  pack(s);
   result.scale = normOf(s, right_);
   result.definite = result.scale >= 0 && deflation_.factor();
   return result.definite;
@@ -259,36 +220,6 @@ LinearResult SymmetricSweeps::solve(const PointVector& right_hand_side, PointVec
     end = refine(double_, x, tolerance, max_iterations, result);
   }
   result.definite = end != SearchEnd::not_definite;
-  return result;
-}
-
-LinearResult SymmetricSweeps::solve(const ConstrainedCholesky& constraints, double stiffness,
-                                    const PointVector& right_hand_side, PointVector& x, double tolerance,
-                                    int max_iterations, double reference, double least)
-{
-  constexpr double kRounding = 1e-12;   // of the reference
-  LinearResult result;
-  std::fill(x.begin(), x.end(), 0.0);
-  pack(double_, false);
-  blocks_.toVisits(right_hand_side, right_);
-  const double square = load(double_, right_, 1.0);
-  result.definite = square >= 0;
-  if (!(square > 0))
-    return result;
-  result.scale = std::max(std::min(reference, least / tolerance * std::sqrt(square)), kRounding * reference);
-  const SearchEnd end = iterate(
-      double_, {}, square, result.scale, tolerance, max_iterations, result,
-      [&] {
-        blocks_.fromVisits(double_.t, residual_);
-        std::fill(product_.begin(), product_.end(), 0.0);
-        constraints.addStiffness(stiffness, residual_.data(), product_.data());
-        for (int v = 0; v < blocks_.points(); ++v)
-          for (int c = 0; c < 3; ++c)
-            double_.q[4 * v + c] += product_[4 * blocks_.pointAt(v) + c];
-      },
-      [](double) {});
-  blocks_.fromVisits(double_.x, x);
-  result.definite = end == SearchEnd::solved;
   return result;
 }
 

@@ -3,7 +3,6 @@
 #include "linalg/deflation.h"
 #include "linalg/swept_blocks.h"
 #include "slender_sim/linalg/conjugate_gradients.h"
-#include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/linalg/point_kernel.h"
 
 namespace slender {
@@ -31,37 +30,20 @@ public:
   {
     blocks_.set(factor, held, apart);
   }
-  /// Of right-hand sides and residuals.
-  double norm(const PointVector& r);
   /// As ConjugateGradients::solve. No force on a group as a whole is left, so that all points together fall as they
   /// should and keep their momentum.
   LinearResult solve(const PointVector& right_hand_side, PointVector& x, double tolerance, int max_iterations);
-  /// The same for the matrix with constraints `stiffness` times as stiff as their own matrix added
-  /// (ConstrainedCholesky::addStiffness), at the price of products with these, where they hold the free points together
-  /// in their place. Stops when the residual is the tolerance times `reference`, and `least` times that of the
-  /// right-hand side.
-  LinearResult solve(const ConstrainedCholesky& constraints, double stiffness, const PointVector& right_hand_side,
-                     PointVector& x, double tolerance, int max_iterations, double reference, double least);
 
 private:
   /// The matrix and the vectors of a search, in one precision.
   template <class Scalar>
   struct Search
   {
-    AlignedVector<Scalar> blocks, diagonal, inverse;   ///< as SweptMatrix has them
+    SweptValues<Scalar> matrix;
     AlignedVector<Scalar> x, r, z, p, t, q;
     AlignedVector<Scalar> group_blocks, transposed_blocks, groups;   ///< as GroupBlocks has them
     /// What a search can take from a residual before rounding errors spoil it.
     static constexpr double kLeast = std::is_same_v<Scalar, float> ? 1e-5 : 1e-13;
-
-    void resize(int points, std::size_t entries)
-    {
-      blocks.resize(9 * entries + 3);   // three more, for wide loads
-      for (AlignedVector<Scalar>* v : {&diagonal, &inverse})
-        v->resize(12 * static_cast<std::size_t>(points));
-      for (AlignedVector<Scalar>* v : {&x, &r, &z, &p, &t, &q})
-        v->assign(4 * static_cast<std::size_t>(points), Scalar(0));
-    }
   };
 
   enum class SearchEnd
@@ -72,13 +54,7 @@ private:
   };
 
   template <class Scalar>
-  void pack(Search<Scalar>& s, bool deflated);
-  template <class Scalar>
-  SweptMatrix<Scalar> matrixOf(const Search<Scalar>& s) const
-  {
-    return {blocks_.points(), blocks_.starts().data(), blocks_.rows().data(),
-            s.blocks.data(),  s.diagonal.data(),       s.inverse.data()};
-  }
+  void pack(Search<Scalar>& s);
   template <class Scalar>
   GroupBlocks<Scalar> groupsOf(Search<Scalar>& s) const
   {

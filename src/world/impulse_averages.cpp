@@ -79,19 +79,19 @@ CollisionReport ImpulseCloths::resolve(const CollisionStep& step)
   return report;
 }
 
-void ImpulseCloths::prepareCorrection(std::size_t k)
+/// The averages do not depend on each other: otherwise the cloth's own step has failed.
+ImpulseCloths::AverageCorrection& ImpulseCloths::prepareCorrection(std::size_t k)
 {
   AverageCorrection& to = corrections_[k];
-  if (to.ready && to.pins == work_.cloths[k].pins && to.set == work_.cloths[k].average_set)
-    return;
-  const auto& c = *averagesOf(k)->weights;
-  to.weights = c * inverse_mass_.segment(first_[k], first_[k + 1] - first_[k]).asDiagonal();
-  to.gram.compute(Eigen::MatrixXd(to.weights * c.transpose()));
-  if (averagesOf(k)->bounds.size() > 0)
-    to.gram_rows = to.weights * c.transpose();
-  to.pins = work_.cloths[k].pins;
-  to.set = work_.cloths[k].average_set;
-  to.ready = true;
+  if (to.set != work_.cloths[k].average_set)
+  {
+    to.set = work_.cloths[k].average_set;
+    to.projection = std::make_unique<AverageProjection>(*averagesOf(k)->weights);
+    to.gap.assign(4 * static_cast<std::size_t>(to.projection->count()), 0.0);
+    to.multipliers = to.gap;
+  }
+  to.projection->prepare(cloth(k).model->mass, [&](int i) { return inverse_mass_[first_[k] + i] > 0.0; });
+  return to;
 }
 
 /// What push_ does on the masses of a cloth against averages that are met: these balance that part, so that no motion
@@ -99,34 +99,20 @@ void ImpulseCloths::prepareCorrection(std::size_t k)
 /// errors that are left as their answer.
 double ImpulseCloths::balancedWork(std::size_t k, double h)
 {
-  constexpr int kSweeps = 100;
-  prepareCorrection(k);
-  AverageCorrection& to = corrections_[k];
+  AverageCorrection& to = prepareCorrection(k);
   const auto& c = *averagesOf(k)->weights;
-  const std::vector<int>& at_bound = next_.cloths[k].at_bound;
-  to.gap.setZero(3, c.rows());
   for (Eigen::Index i = 0; i < c.rows(); ++i)
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(to.weights, i); entry; ++entry)
-      to.gap.col(i) += entry.value() * push_.col(first_[k] + entry.col());
-  if (at_bound.empty())
   {
-    to.columns = to.gap.transpose();
-    to.gram.solveInPlace(to.columns);
-    return h * h * to.gap.cwiseProduct(to.columns.transpose()).sum();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (AverageProjection::Averages::InnerIterator entry(c, i); entry; ++entry)
+      sum += entry.value() * to.projection->give()[entry.col()] * push_.col(first_[k] + entry.col());
+    point(to.gap, i) = sum;
   }
-  to.multipliers.setZero(3, c.rows());
-  to.forces = to.gap;
-  for (int sweep = 0; sweep < kSweeps; ++sweep)
-    for (Eigen::Index i = 0; i < c.rows(); ++i)
-    {
-      if (std::binary_search(at_bound.begin(), at_bound.end(), static_cast<int>(i)))
-        continue;
-      const Eigen::Vector3d change = to.forces.col(i) / to.gram_rows.coeff(i, i);
-      to.multipliers.col(i) += change;
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(to.gram_rows, i); entry; ++entry)
-        to.forces.col(entry.col()) -= entry.value() * change;
-    }
-  return h * h * to.gap.cwiseProduct(to.multipliers).sum();
+  to.multipliers = to.gap;
+  to.projection->leaveOut(next_.cloths[k].at_bound);
+  to.projection->solve(to.multipliers);
+  to.projection->leaveOut({});
+  return h * h * pointKernels().dot(to.projection->count(), to.gap.data(), to.multipliers.data());
 }
 
 /// Makes the multipliers of a cloth's averages those that bounds of their forces allow: block Gauss-Seidel over
@@ -144,18 +130,26 @@ double ImpulseCloths::boundAverages(std::size_t k, double h, double gap)
   to.forces = steppers_[k].averageForces() + shared_averages_[k];
   bool within = true;
   for (Eigen::Index i = 0; i < bounds.size(); ++i)
-    within = within && (to.forces.col(i) + to.multipliers.col(i) / (h * h)).norm() <= (1.0 + kBoundSlack) * bounds[i];
+    within =
+        within && (to.forces.col(i) + point(to.multipliers, i) / (h * h)).norm() <= (1.0 + kBoundSlack) * bounds[i];
   if (within)
     return gap;
-  to.multipliers.setZero();
+  std::fill(to.multipliers.begin(), to.multipliers.end(), 0.0);
+  const PointMatrix& gram = to.projection->gram();
   double needed = 0.0;
-  for (int sweep = 0; sweep < kSweeps && budget_->spend(to.gram_rows.nonZeros() / kEntriesPerCount); ++sweep)
+  for (int sweep = 0; sweep < kSweeps && budget_->spend(static_cast<long>(gram.values().size()) / kEntriesPerCount);
+       ++sweep)
   {
     double largest = 0.0;
     for (Eigen::Index i = 0; i < bounds.size(); ++i)
     {
-      const double give = h * h * to.gram_rows.coeff(i, i), most = (1.0 + kBoundSlack) * bounds[i];
-      const Eigen::Vector3d wanted = to.forces.col(i) + to.gap.col(i) / give, now = to.forces.col(i);
+      const int row = static_cast<int>(i), end = gram.starts()[row + 1];
+      double give = 0.0;
+      for (int e = gram.starts()[row]; e < end; ++e)
+        if (gram.column(e) == row)
+          give = h * h * gram.values()[e];
+      const double most = (1.0 + kBoundSlack) * bounds[i];
+      const Eigen::Vector3d wanted = to.forces.col(i) + point(to.gap, i) / give, now = to.forces.col(i);
       const bool beyond = wanted.norm() > most;
       const Eigen::Vector3d change = (beyond ? Eigen::Vector3d(most / wanted.norm() * wanted) : wanted) - now;
       if (sweep == 0 && beyond)
@@ -164,9 +158,9 @@ double ImpulseCloths::boundAverages(std::size_t k, double h, double gap)
         needed = std::max(needed, give * change.norm() / to.tolerance);
       largest = std::max(largest, give * change.norm());
       to.forces.col(i) += change;
-      to.multipliers.col(i) += h * h * change;
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(to.gram_rows, i); entry; ++entry)
-        to.gap.col(entry.col()) -= h * h * entry.value() * change;
+      point(to.multipliers, i) += h * h * change;
+      for (int e = gram.starts()[row]; e < end; ++e)
+        point(to.gap, gram.column(e)) -= h * h * gram.values()[e] * change;
     }
     if (sweep == 0 && !(needed > 1))
       return needed;
@@ -187,40 +181,44 @@ double ImpulseCloths::meetAverages(double h)
       continue;
     const bool bounded = averagesOf(k)->bounds.size() > 0;
     const auto& c = *averagesOf(k)->weights;
-    AverageCorrection& to = corrections_[k];
-    const int first = first_[k], count = first_[k + 1] - first;
-    const auto x = x_.middleCols(first, count);
-    to.gap = sub_inputs_[k].averages;
+    AverageCorrection& to = prepareCorrection(k);
+    const int first = first_[k];
+    double gap = 0.0;
     for (Eigen::Index i = 0; i < c.rows(); ++i)
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(c, i); entry; ++entry)
-        to.gap.col(i) -= entry.value() * x.col(entry.col());
-    double gap = to.gap.colwise().norm().maxCoeff() / to.tolerance;
+    {
+      Eigen::Vector3d left = sub_inputs_[k].averages.col(i);
+      for (AverageProjection::Averages::InnerIterator entry(c, i); entry; ++entry)
+        left -= entry.value() * x_.col(first + entry.col());
+      point(to.gap, i) = left;
+      gap = std::max(gap, left.norm() / to.tolerance);
+    }
     if (!bounded && !(gap > 1))
     {
       worst = std::max(worst, gap);
       continue;
     }
-    prepareCorrection(k);
-    to.columns = to.gap.transpose();
-    to.gram.solveInPlace(to.columns);
-    to.multipliers = to.columns.transpose();
+    to.multipliers = to.gap;
+    to.projection->solve(to.multipliers);
     if (bounded)
       gap = boundAverages(k, h, gap);
     worst = std::max(worst, gap);
     if (!(gap > 1))
       continue;
     for (Eigen::Index i = 0; i < c.rows(); ++i)
-      for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(to.weights, i); entry; ++entry)
+    {
+      const Eigen::Vector3d moved = point(to.multipliers, i);
+      for (AverageProjection::Averages::InnerIterator entry(c, i); entry; ++entry)
       {
-        const Eigen::Vector3d shift = entry.value() * to.multipliers.col(i);
+        const Eigen::Vector3d shift = entry.value() * to.projection->give()[entry.col()] * moved;
         x_.col(first + entry.col()) += shift;
         v_.col(first + entry.col()) += shift / h;
       }
-    to.multipliers /= h * h;   // forces
-    shared_averages_[k] += to.multipliers;
-    for (std::size_t p = 0; p < to.pins.size(); ++p)
+      shared_averages_[k].col(i) += moved / (h * h);   // forces
+    }
+    const std::vector<int>& pins = work_.cloths[k].pins;
+    for (std::size_t p = 0; p < pins.size(); ++p)
       for (Eigen::Index i = 0; i < c.rows(); ++i)
-        shared_pins_[k].col(static_cast<Eigen::Index>(p)) += c.coeff(i, to.pins[p]) * to.multipliers.col(i);
+        shared_pins_[k].col(static_cast<Eigen::Index>(p)) += c.coeff(i, pins[p]) / (h * h) * point(to.multipliers, i);
   }
   return worst;
 }

@@ -5,10 +5,9 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include "slender_sim/cloth/cloth_stepper.h"
 #include "contact/impulses/surface_collider.h"
+#include "linalg/average_projection.h"
 #include "slender_sim/dynamics/substep_controller.h"
 #include "world_object.h"
 
@@ -96,7 +95,8 @@ private:
   CollisionReport resolveContacts(const CollisionStep& step);
   CollisionReport resolve(const CollisionStep& step);
   double meetAverages(double h);
-  void prepareCorrection(std::size_t cloth);
+  struct AverageCorrection;
+  AverageCorrection& prepareCorrection(std::size_t cloth);
   double balancedWork(std::size_t cloth, double h);
   double boundAverages(std::size_t cloth, double h, double gap);
   /// Those that act on a cloth in the present step; null: none.
@@ -142,16 +142,11 @@ private:
   /// How a cloth with prescribed averages moves so that it has them again.
   struct AverageCorrection
   {
-    double tolerance = 0.0;                                 ///< [m]
-    std::vector<int> pins;                                  ///< that `gram` is for, and
-    int set = 0;                                            ///< of averages
-    Eigen::SparseMatrix<double, Eigen::RowMajor> weights;   ///< averages over masses
-    Eigen::LDLT<Eigen::MatrixXd> gram;
-    Eigen::Matrix3Xd gap, multipliers;
-    Eigen::SparseMatrix<double, Eigen::RowMajor> gram_rows;   ///< with bounds only, as
-    Eigen::Matrix3Xd forces;                                  ///< [N]
-    Eigen::MatrixXd columns;                                  ///< count x 3
-    bool ready = false;
+    double tolerance = 0.0;   ///< [m]
+    int set = -1;             ///< of averages, that `projection` is for
+    std::unique_ptr<AverageProjection> projection;
+    PointVector gap, multipliers;
+    Eigen::Matrix3Xd forces;   ///< [N]
   };
   std::vector<AverageCorrection> corrections_;
   Eigen::Matrix3Xd held_impulses_;

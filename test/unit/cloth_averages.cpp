@@ -205,7 +205,7 @@ TEST(ClothAverages, StayExactWhereTheyTearAtTheCloth)
   EXPECT_GT(report.max_strain, 100.0);
 }
 
-/// A sheet of 289 vertices whose quarters are averaged over: their steps are swept.
+/// A sheet of 289 vertices whose quarters are averaged over.
 std::shared_ptr<ClothModel> quarteredSheet(BendingModel bending)
 {
   const TriangleMesh mesh = gridMesh(1.0, 1.0, 16, 16, GridPattern::alternating);
@@ -220,10 +220,9 @@ std::shared_ptr<ClothModel> quarteredSheet(BendingModel bending)
   return model;
 }
 
-TEST(ClothAverages, SweepsSolveTheSameSteps)
+TEST(ClothAverages, TheToleranceIsAccurateEnough)
 {
-  // few averages of many vertices, a gripper, air and bending of both kinds: sweeps, which are taken for them, and
-  // conjugate gradients among motions that leave the averages alone
+  // few averages of many vertices, a gripper, air and bending of both kinds
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
   {
     const auto model = quarteredSheet(bending);
@@ -232,15 +231,12 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
     pinVertices(state, {0});
     ClothInputs inputs;
     inputs.pins = state.x.col(0);
-    const auto solverOf = [&](ClothSolver solver, double tolerance) {
+    const auto stepperOf = [&](double tolerance) {
       ClothOptions o = trackingOptions(true);
-      o.solver = solver;
       o.linear_tolerance = tolerance;
       return ClothStepper(model, o);
     };
-    ClothStepper exact = solverOf(ClothSolver::conjugate_gradients, 1e-10),
-                 fine = solverOf(ClothSolver::automatic, 1e-10);
-    ClothStepper swept = solverOf(ClothSolver::automatic, 5e-3);
+    ClothStepper exact = stepperOf(1e-12), fine = stepperOf(1e-5), swept = stepperOf(5e-3);   // in both precisions
     double error = 0.0, motion = 0.0;
     int iterations = 0;
     const Matrix3Xd rest = state.x * quarters->transpose();
@@ -259,8 +255,7 @@ TEST(ClothAverages, SweepsSolveTheSameSteps)
       for (const ClothState* each : {&a, &b, &c})
         EXPECT_LT((each->x * quarters->transpose() - inputs.averages).cwiseAbs().maxCoeff(),
                   1e-13 * inputs.averages.cwiseAbs().maxCoeff());
-      // tolerances in norms that differ by the root of the condition number
-      EXPECT_LT((b.x - a.x).norm(), 1e-7 * (a.x - state.x).norm()) << k;
+      EXPECT_LT((b.x - a.x).norm(), 1e-3 * (a.x - state.x).norm()) << k;
       EXPECT_LT((swept.averageForces() - exact.averageForces()).norm(), 0.2 * exact.averageForces().norm()) << k;
       error += (c.x - a.x).squaredNorm();
       motion += (a.x - state.x).squaredNorm();
@@ -302,7 +297,6 @@ TEST(ClothAverages, NeedNoLoadToBeMoved)
 {
   // the first motion of a sheet at rest, nothing else acts: the tolerance counts from that motion
   ClothOptions exactly = trackingOptions(true);
-  exactly.solver = ClothSolver::conjugate_gradients;
   exactly.linear_tolerance = 1e-10;
   const auto model = quarteredSheet(BendingModel::hinge);
   ClothInputs inputs;
@@ -324,8 +318,11 @@ TEST(ClothAverages, RefuseWhatCannotBe)
   o.integrator = Integrator::symplectic_euler;
   EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
   o = trackingOptions(false);
-  o.solver = ClothSolver::cholesky;
-  EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
+  for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::conjugate_gradients})
+  {
+    o.solver = solver;
+    EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
+  }
   // held vertices that leave nothing of an average
   Tracked held;
   pinVertices(held.state, [&] {

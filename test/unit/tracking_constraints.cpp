@@ -6,6 +6,7 @@
 #include <Eigen/SparseLU>
 #include <gtest/gtest.h>
 
+#include "linalg/projected_sweeps.h"
 #include "slender_sim/linalg/constrained_cholesky.h"
 #include "slender_sim/tracking/clustering.h"
 #include "slender_sim/tracking/weak_constraints.h"
@@ -133,186 +134,270 @@ TEST(WeakConstraints, NamesEmptyAndDependentFunctions)
             std::string::npos);
 }
 
-TEST(ConstrainedCholesky, SolvesTheSaddlePointSystem)
+/// A sheet with averages by the hats of a coarser mesh, which is subdivided: blocks A, a matrix B that acts on each
+/// coordinate alike, and held corners.
+struct AveragedSheet
 {
-  const TriangleMesh coarse = gridMesh(1.0, 1.0, 3, 3, GridPattern::alternating);
-  const Subdivision fine = subdivide(coarse, 2);
-  const int n = static_cast<int>(fine.mesh.vertices.cols());
-  const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
-  const int m = constraints.count();
-  std::vector<Eigen::Triplet<double>> entries;
-  const PointMatrix bending =
-      isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
-  for (int i = 0; i < n; ++i)
-    for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
-      entries.emplace_back(i, bending.column(k), bending.values()[k]);
-  for (int i = 0; i < n; ++i)
-    entries.emplace_back(i, i, 1.0 + 0.01 * i);
-  const PointMatrix P(n, entries);
-  SparseCholesky factor;
-  factor.setPattern(P);
-  Random random(5);
-  using Schur = ConstrainedCholesky::Schur;
-  for (const auto& [schur, pinned] : {std::pair(Schur::none, false), std::pair(Schur::none, true),
-                                      std::pair(Schur::inverse, false), std::pair(Schur::inverse, true)})
+  AveragedSheet(int cells, int levels, bool pinned)
+    : coarse(gridMesh(1.0, 1.0, cells, cells, GridPattern::alternating)),
+      fine(subdivide(coarse, levels)),
+      n(static_cast<int>(fine.mesh.vertices.cols())),
+      constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh)),
+      held(n, 0),
+      mass(n)
   {
-    ConstrainedCholesky saddle;
-    saddle.setConstraints(constraints.matrix(), schur);
-    std::vector<char> fixed(n, 0);
-    fixed[2] = fixed[n - 1] = pinned;
-    ASSERT_TRUE(factor.factor(P, fixed.data()));
-    ASSERT_TRUE(saddle.factor(P, P.values().data(), factor, fixed.data()));
-    PointVector r(4 * n, 0.0), z(4 * n, 0.0), g(4 * m, 0.0), mu(4 * m, 0.0);
+    held[2] = held[n - 1] = pinned;
+    Random random(6);
+    std::vector<Eigen::Triplet<double>> entries;
+    std::vector<int> starts{0}, rows;
+    const Eigen::MatrixXi& edges = meshTopology(fine.mesh).edges;
+    std::vector<std::vector<int>> below(n);
+    for (Eigen::Index e = 0; e < edges.cols(); ++e)
+      below[edges.col(e).minCoeff()].push_back(edges.col(e).maxCoeff());
+    for (int j = 0; j < n; ++j)
+    {
+      rows.push_back(j);
+      std::sort(below[j].begin(), below[j].end());
+      rows.insert(rows.end(), below[j].begin(), below[j].end());
+      starts.push_back(static_cast<int>(rows.size()));
+    }
+    a = BlockMatrix(starts, rows);
+    a.setZero();
+    for (int j = 0; j < n; ++j)
+    {
+      mass[j] = 1e-3 * (1.0 + 0.3 * random.vector()[0]);
+      entries.emplace_back(j, j, mass[j]);
+    }
+    for (Eigen::Index e = 0; e < edges.cols(); ++e)   // springs, with a part that has no direction
+    {
+      const int i = edges(0, e), j = edges(1, e);
+      const Vector3d along = random.vector().normalized();
+      const Eigen::Matrix3d k = along * along.transpose();
+      addBlock(i, i, k);
+      addBlock(j, j, k);
+      addBlock(i, j, -k);
+      for (const auto& [r, c, sign] : {std::tuple(i, i, 1.0), {j, j, 1.0}, {i, j, -1.0}, {j, i, -1.0}})
+        entries.emplace_back(r, c, 0.1 * sign);
+    }
+    b = PointMatrix(n, entries);
+  }
+  void addBlock(int i, int j, const Eigen::Matrix3d& k)
+  {
+    Eigen::Map<Eigen::Matrix3d>(a.values() + 9 * static_cast<std::size_t>(a.block(std::max(i, j), std::min(i, j)))) +=
+        k;
+  }
+  /// [A + factor B, C^T; C, 0] with the identity at held points.
+  Eigen::SparseMatrix<double> saddle(double factor) const
+  {
+    const int m = constraints.count();
+    std::vector<Eigen::Triplet<double>> entries;
+    const auto add = [&](int i, int j, double value, bool free) {
+      if (free)
+        entries.emplace_back(i, j, value);
+    };
+    for (int j = 0; j < n; ++j)
+      for (int k = a.starts()[j]; k < a.starts()[j + 1]; ++k)
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c)
+          {
+            const int i = a.rows()[k];
+            const double value = a.values()[9 * static_cast<std::size_t>(k) + 3 * c + r];
+            add(3 * i + r, 3 * j + c, value, !held[i] && !held[j]);
+            add(3 * j + c, 3 * i + r, value, i != j && !held[i] && !held[j]);
+          }
     for (int i = 0; i < n; ++i)
-      if (!fixed[i])
-        point(r, i) = random.vector();
-    for (int i = 0; i < m; ++i)
-      point(g, i) = random.vector();
-    saddle.solve(r.data(), g.data(), z.data(), mu.data());
-    MatrixXd dense = MatrixXd::Zero(n + m, n + m);
-    dense.topLeftCorner(n, n) = MatrixXd(P.toEigen());
-    dense.bottomLeftCorner(m, n) = MatrixXd(constraints.matrix());
-    for (int i = 0; i < n; ++i)
-      if (fixed[i])
+      for (int c = 0; c < 3; ++c)
       {
-        dense.row(i).setZero();
-        dense.col(i).setZero();
-        dense(i, i) = 1.0;
+        add(3 * i + c, 3 * i + c, 1.0, held[i]);
+        for (int k = b.starts()[i]; k < b.starts()[i + 1]; ++k)
+          add(3 * i + c, 3 * b.column(k) + c, factor * b.values()[k], !held[i] && !held[b.column(k)]);
       }
-    dense.topRightCorner(n, m) = dense.bottomLeftCorner(m, n).transpose();
-    MatrixXd right(n + m, 3), solution(n + m, 3);
-    right << matrixOf(r).transpose(), matrixOf(g).transpose();
-    solution << matrixOf(z).transpose(), matrixOf(mu).transpose();
-    const MatrixXd expected = dense.partialPivLu().solve(right);
-    EXPECT_LT((solution - expected).norm(), 1e-10 * expected.norm()) << pinned;
-    // what it is for: the constraints hold to rounding
-    EXPECT_LT((dense.bottomLeftCorner(m, n) * solution.topRows(n) - right.bottomRows(m)).cwiseAbs().maxCoeff(), 1e-12);
-    // S^-1, as the constraints' norm and their stiffness
-    const MatrixXd c = dense.bottomLeftCorner(m, n), ct = dense.topRightCorner(n, m),
-                   s = c * dense.topLeftCorner(n, n).partialPivLu().solve(ct);
-    const double square = (right.bottomRows(m).transpose() * s.llt().solve(right.bottomRows(m))).trace();
-    EXPECT_NEAR(saddle.norm(g.data()), std::sqrt(square), 1e-10 * std::sqrt(square));
-    if (schur == Schur::none)
-      continue;
-    const MatrixXd along = s.llt().solve(c * matrixOf(z).transpose());
-    PointVector stiff = r;
-    saddle.addStiffness(0.7, z.data(), stiff.data());
-    const MatrixXd added = matrixOf(stiff).transpose() - right.topRows(n), stiffness = 0.7 * ct * along;
-    EXPECT_LT((added - stiffness).norm(), 1e-10 * stiffness.norm());
+    for (int i = 0; i < m; ++i)
+      for (AverageProjection::Averages::InnerIterator entry(constraints.matrix(), i); entry; ++entry)
+        for (int c = 0; c < 3; ++c)
+        {
+          const int point = static_cast<int>(entry.col());
+          add(3 * (n + i) + c, 3 * point + c, entry.value(), !held[point]);
+          add(3 * point + c, 3 * (n + i) + c, entry.value(), !held[point]);
+        }
+    Eigen::SparseMatrix<double> matrix(3 * (n + m), 3 * (n + m));
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    return matrix;
   }
-  ConstrainedCholesky::Constraints twice(2, n);
-  twice.insert(0, 4) = twice.insert(1, 4) = 1.0;
-  for (const Schur schur : {Schur::none, Schur::inverse})
+  PointVector load() const
   {
-    ConstrainedCholesky dependent;
-    dependent.setConstraints(twice, schur);
-    EXPECT_FALSE(dependent.factor(P, P.values().data(), factor, nullptr));
+    Random random(8);
+    PointVector r(4 * static_cast<std::size_t>(n), 0.0);
+    for (int i = 0; i < n; ++i)
+      if (!held[i])
+        point(r, i) = random.vector() + Vector3d(0.0, 0.0, 1.0);
+    return r;
   }
+
+  TriangleMesh coarse;
+  Subdivision fine;
+  int n;
+  WeakConstraints constraints;
+  std::vector<char> held;
+  VectorXd mass;
+  BlockMatrix a;
+  PointMatrix b;
+};
+
+TEST(AverageProjection, MovesPointsByTheLeast)
+{
+  for (const bool pinned : {false, true})
+  {
+    const AveragedSheet sheet(4, 2, pinned);
+    AverageProjection projection(sheet.constraints.matrix());
+    ASSERT_TRUE(projection.prepare(sheet.mass, [&](int i) { return !sheet.held[i]; }));
+    const int m = projection.count();
+    MatrixXd c(sheet.constraints.matrix());
+    for (int i = 0; i < sheet.n; ++i)
+      c.col(i) *= sheet.held[i] ? 0.0 : 1.0;
+    const MatrixXd give = sheet.mass.cwiseInverse().asDiagonal() * c.transpose();
+    Random random(3);
+    Matrix3Xd changes(3, m);
+    for (int i = 0; i < m; ++i)
+      changes.col(i) = random.vector();
+    const MatrixXd expected = give * (c * give).ldlt().solve(changes.transpose());
+    EXPECT_LT((matrixOf(projection.displacements(changes)).transpose() - expected).norm(), 1e-11 * expected.norm());
+    // the forces of averages leave no acceleration of the averages
+    PointVector forces = sheet.load(), mu(4 * static_cast<std::size_t>(m), 0.0);
+    projection.multipliers(forces, mu);
+    projection.addForces(-1.0, mu, forces);
+    EXPECT_LT((give.transpose() * matrixOf(forces).transpose()).norm(),
+              1e-10 * (give.transpose() * matrixOf(sheet.load()).transpose()).norm());
+    // one that is left out has no force, and all others are exact
+    mu.assign(mu.size(), 1.0);
+    projection.leaveOut({1, 4});
+    projection.solve(mu);
+    EXPECT_EQ(point(mu, 1).norm() + point(mu, 4).norm(), 0.0);
+    VectorXd reached = c * give * matrixOf(mu).transpose().col(0);
+    reached[1] = reached[4] = 1.0;
+    EXPECT_LT((reached - VectorXd::Ones(m)).norm(), 1e-10);
+  }
+  AverageProjection::Averages twice(2, 9);
+  twice.insert(0, 4) = twice.insert(1, 4) = 1.0;
+  AverageProjection dependent(twice);
+  EXPECT_FALSE(dependent.prepare(VectorXd::Ones(9), [](int) { return true; }));
+  AverageProjection::Averages apart(2, 9);
+  apart.insert(0, 3) = apart.insert(1, 4) = 1.0;
+  AverageProjection held(apart);
+  EXPECT_TRUE(held.prepare(VectorXd::Ones(9), [](int) { return true; }));
+  EXPECT_FALSE(held.prepare(VectorXd::Ones(9), [](int i) { return i != 4; }));
 }
 
-TEST(ConstrainedCholesky, FactorsManyConstraintsWithTheirPoints)
+TEST(ProjectedSweeps, SolveTheSaddlePointSystem)
 {
-  const TriangleMesh coarse = gridMesh(1.0, 1.0, 30, 30, GridPattern::alternating);
-  const Subdivision fine = subdivide(coarse, 1);
-  const int n = static_cast<int>(fine.mesh.vertices.cols());
-  const WeakConstraints constraints(subdivisionBasis(fine), hatMassMatrix(coarse), hatMassMatrix(fine.mesh));
-  const int m = constraints.count();
-  std::vector<Eigen::Triplet<double>> entries;
-  const PointMatrix bending =
-      isometricBending(fine.mesh, meshTopology(fine.mesh), IsometricElement::nonconforming, 1e-3);
-  for (int i = 0; i < n; ++i)
-    for (int k = bending.starts()[i]; k < bending.starts()[i + 1]; ++k)
-      entries.emplace_back(i, bending.column(k), bending.values()[k]);
-  for (int i = 0; i < n; ++i)
-    entries.emplace_back(i, i, 1e-2 + 1e-4 * (i % 100));
-  const PointMatrix P(n, entries);
-  SparseCholesky factor;
-  factor.setPattern(P);
-  ConstrainedCholesky saddle;
-  saddle.setConstraints(constraints.matrix());
-  Random random(6);
-  for (const bool pinned : {false, true, true})
+  // many averages, and so few that groups of points move as a whole
+  for (const auto& [cells, levels] : {std::pair(12, 1), std::pair(1, 4)})
+    for (const bool pinned : {false, true})
+      for (const double tolerance : {1e-4, 1e-11})   // in single and in double precision
+      {
+        const AveragedSheet sheet(cells, levels, pinned);
+        AverageProjection projection(sheet.constraints.matrix());
+        ASSERT_TRUE(projection.prepare(sheet.mass, [&](int i) { return !sheet.held[i]; }));
+        ProjectedSweeps sweeps;
+        sweeps.setPattern(sheet.a, &sheet.b);
+        sweeps.setAverages(projection);
+        ASSERT_TRUE(sweeps.set(1.3, sheet.held));
+        PointVector x(4 * static_cast<std::size_t>(sheet.n), 0.0);
+        const PointVector r = sheet.load();
+        const LinearResult result = sweeps.solve(r, x, tolerance, 2000, 0.0);
+        EXPECT_TRUE(result.definite);
+        EXPECT_LE(result.residual, tolerance);
+        EXPECT_LT(result.iterations, tolerance < 1e-9 ? 200 : 100);
+        const Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(sheet.saddle(1.3));
+        VectorXd right = VectorXd::Zero(3 * (sheet.n + projection.count()));
+        for (int i = 0; i < sheet.n; ++i)
+          right.segment<3>(3 * i) = point(r, i);
+        const VectorXd solution = lu.solve(right), expected = solution.head(3 * sheet.n);
+        const MatrixXd found = matrixOf(x);
+        // norms that differ by the root of the condition number
+        EXPECT_LT((found.reshaped() - expected).norm(), 100 * tolerance * expected.norm()) << cells << pinned;
+        EXPECT_LT((sheet.constraints.matrix() * found.transpose()).cwiseAbs().maxCoeff(),
+                  1e-13 * found.cwiseAbs().maxCoeff() * sheet.n);
+      }
+}
+
+TEST(ProjectedSweeps, TakeAsManyIterationsOnFineMeshes)
+{
+  int fewest = 1000, most = 0;
+  for (const int cells : {8, 16, 32})
   {
-    std::vector<char> fixed(n, 0);
-    fixed[2] = fixed[n - 1] = pinned;
-    ASSERT_TRUE(factor.factor(P, fixed.data()));
-    ASSERT_TRUE(saddle.factor(P, P.values().data(), factor, fixed.data()));
-    PointVector r(4 * n, 0.0), z(4 * n, 0.0), g(4 * m, 0.0), mu(4 * m, 0.0);
-    for (int i = 0; i < n; ++i)
-      if (!fixed[i])
-        point(r, i) = random.vector();
-    for (int i = 0; i < m; ++i)
-      point(g, i) = random.vector();
-    std::vector<Eigen::Triplet<double>> whole;
-    for (const auto& e : entries)
-      if (!fixed[e.row()] && !fixed[e.col()])
-        whole.push_back(e);
-    for (int i = 0; i < n; ++i)
-      if (fixed[i])
-        whole.emplace_back(i, i, 1.0);
-    for (int i = 0; i < m; ++i)
-      for (ConstrainedCholesky::Constraints::InnerIterator entry(constraints.matrix(), i); entry; ++entry)
-        if (!fixed[entry.col()])
-        {
-          whole.emplace_back(n + i, entry.col(), entry.value());
-          whole.emplace_back(entry.col(), n + i, entry.value());
-        }
-    Eigen::SparseMatrix<double> kkt(n + m, n + m);
-    kkt.setFromTriplets(whole.begin(), whole.end());
-    const Eigen::SparseLU<Eigen::SparseMatrix<double>> lu(kkt);
-    const auto expect = [&](const PointVector& load, const PointVector& gap, const PointVector& point_answer,
-                            const PointVector& multipliers, double tolerance) {
-      MatrixXd right(n + m, 3), solution(n + m, 3);
-      right << matrixOf(load).transpose(), matrixOf(gap).transpose();
-      solution << matrixOf(point_answer).transpose(), matrixOf(multipliers).transpose();
-      const MatrixXd expected = lu.solve(right);
-      EXPECT_LT((solution - expected).topRows(n).norm(), tolerance * expected.topRows(n).norm()) << pinned;
-      EXPECT_LT((solution - expected).bottomRows(m).norm(), 10 * tolerance * expected.bottomRows(m).norm()) << pinned;
-      return expected;
-    };
-    const PointVector none(4 * m, 0.0), free(4 * n, 0.0);
-    ConstrainedCholesky::Norms norms;
-    saddle.solve(r.data(), g.data(), z.data(), mu.data(), &norms);
-    const MatrixXd expected = expect(r, g, z, mu, 1e-11);   // rounding errors, of stiffnesses that differ by 1e5
-    const MatrixXd moved = expected.topRows(n);
-    EXPECT_NEAR(norms.step, std::sqrt((moved.transpose() * (P.toEigen() * moved)).trace()), 1e-8 * norms.step);
-    PointVector gap_alone(4 * m, 0.0), image(4 * n, 0.0);
-    saddle.solve(free.data(), g.data(), z.data(), gap_alone.data());
-    expect(free, g, z, gap_alone, 1e-11);
-    const double square = -(matrixOf(g).array() * matrixOf(gap_alone).array()).sum();
-    EXPECT_NEAR(saddle.norm(g.data()), std::sqrt(square), 1e-9 * std::sqrt(square));
-    factor.solvePoints(r.data(), image.data());
-    EXPECT_NEAR(norms.load, std::sqrt(square + (matrixOf(r).array() * matrixOf(image).array()).sum()),
-                1e-9 * norms.load);
-    z = r;   // in its own place, as conjugate gradients do
-    saddle.solve(z.data(), nullptr, z.data(), mu.data());
-    const MatrixXd within = expect(r, none, z, mu, 1e-11);
-    saddle.multipliers(r.data(), mu.data());
-    EXPECT_LT((matrixOf(mu).transpose() - within.bottomRows(m)).norm(), 1e-9 * within.bottomRows(m).norm());
+    const AveragedSheet sheet(cells, 2, true);
+    AverageProjection projection(sheet.constraints.matrix());
+    ASSERT_TRUE(projection.prepare(sheet.mass, [&](int i) { return !sheet.held[i]; }));
+    ProjectedSweeps sweeps;
+    sweeps.setPattern(sheet.a, &sheet.b);
+    sweeps.setAverages(projection);
+    ASSERT_TRUE(sweeps.set(1.0, sheet.held));
+    PointVector x(4 * static_cast<std::size_t>(sheet.n), 0.0);
+    const int iterations = sweeps.solve(sheet.load(), x, 1e-5, 2000, 0.0).iterations;
+    fewest = std::min(fewest, iterations);
+    most = std::max(most, iterations);
   }
-  // more of them than points
-  ConstrainedCholesky::Constraints unit(500, 20);
-  for (int i = 0; i < 500; ++i)
-    unit.insert(i, i % 20) = 1.0;
+  EXPECT_LE(most, fewest + fewest / 4 + 1);
+}
+
+TEST(ProjectedSweeps, SeeMatricesThatAreNotDefinite)
+{
+  AveragedSheet sheet(6, 2, true);
+  sheet.addBlock(40, 40, -20.0 * Eigen::Matrix3d::Identity());
+  AverageProjection projection(sheet.constraints.matrix());
+  ASSERT_TRUE(projection.prepare(sheet.mass, [&](int i) { return !sheet.held[i]; }));
+  ProjectedSweeps sweeps;
+  sweeps.setPattern(sheet.a, &sheet.b);
+  sweeps.setAverages(projection);
+  PointVector x(4 * static_cast<std::size_t>(sheet.n), 0.0);
+  EXPECT_FALSE(sweeps.set(1.0, sheet.held) && sweeps.solve(sheet.load(), x, 1e-5, 2000, 0.0).definite);
+}
+
+TEST(ConstrainedCholesky, SoftensConstraints)
+{
+  for (const bool pinned : {false, true})
+  {
+    const AveragedSheet sheet(4, 2, pinned);
+    SparseCholesky factor;
+    factor.setPattern(sheet.b);
+    ASSERT_TRUE(factor.factor(sheet.b, sheet.held.data()));
+    ConstrainedCholesky softened;
+    softened.setConstraints(sheet.constraints.matrix());
+    ASSERT_TRUE(softened.factor(factor, sheet.held.data()));
+    const int m = softened.count();
+    MatrixXd p(sheet.b.toEigen()), c(sheet.constraints.matrix());
+    for (int i = 0; i < sheet.n; ++i)
+      if (sheet.held[i])
+      {
+        p.row(i).setZero();
+        p.col(i).setZero();
+        c.col(i).setZero();
+        p(i, i) = 1.0;
+      }
+    const VectorXd weights = VectorXd::LinSpaced(m, 0.1, 3.0);
+    softened.soften(weights);
+    const PointVector r = sheet.load();
+    PointVector z = r;
+    softened.solveSoftened(r.data(), z.data());
+    const MatrixXd expected = (p + c.transpose() * weights.asDiagonal() * c).ldlt().solve(matrixOf(r).transpose());
+    EXPECT_LT((matrixOf(z).transpose() - expected).norm(), 1e-9 * expected.norm()) << pinned;
+    const MatrixXd stiffness = (c * p.ldlt().solve(c.transpose())).inverse();
+    for (int i = 0; i < m; ++i)
+      EXPECT_NEAR(softened.stiffness(i), stiffness(i, i), 1e-8 * stiffness(i, i));
+  }
+  ConstrainedCholesky::Constraints twice(2, 9);
+  twice.insert(0, 4) = twice.insert(1, 4) = 1.0;
   std::vector<Eigen::Triplet<double>> ones;
-  for (int i = 0; i < 20; ++i)
+  for (int i = 0; i < 9; ++i)
     ones.emplace_back(i, i, 1.0);
-  const PointMatrix identity(20, ones);
-  SparseCholesky small;
-  small.setPattern(identity);
-  ASSERT_TRUE(small.factor(identity, nullptr));
-  ConstrainedCholesky crowded;
-  crowded.setConstraints(unit);
-  EXPECT_FALSE(crowded.factor(identity, identity.values().data(), small, nullptr));
-  // two of them the same
-  std::vector<Eigen::Triplet<double>> same;
-  for (int i = 0; i < m; ++i)
-    for (ConstrainedCholesky::Constraints::InnerIterator entry(constraints.matrix(), i == 7 ? 8 : i); entry; ++entry)
-      same.emplace_back(i, entry.col(), entry.value());
-  ConstrainedCholesky::Constraints twice_eight(m, n);
-  twice_eight.setFromTriplets(same.begin(), same.end());
-  saddle.setConstraints(twice_eight);
-  EXPECT_FALSE(saddle.factor(P, P.values().data(), factor, nullptr));
+  const PointMatrix identity(9, ones);
+  SparseCholesky factor;
+  factor.setPattern(identity);
+  ASSERT_TRUE(factor.factor(identity, nullptr));
+  ConstrainedCholesky dependent;
+  dependent.setConstraints(twice);
+  EXPECT_FALSE(dependent.factor(factor, nullptr));
 }
 
 /// Two stiff plates beside each other with a hinge between them at x = 0, of which only one frame shows the bend.

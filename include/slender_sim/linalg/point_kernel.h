@@ -40,6 +40,15 @@ struct GroupBlocks
   Scalar* motion = nullptr;                                ///< c, four numbers per group
 };
 
+/// A sparse matrix of numbers that act on the three coordinates of points alike, by rows.
+template <class Scalar>
+struct PointRows
+{
+  int rows = 0;
+  const int *starts = nullptr, *columns = nullptr;
+  const Scalar* values = nullptr;
+};
+
 /// What an iteration of conjugate gradients with symmetric sweeps consists of. Vectors have four numbers per point, the
 /// last of them unused.
 template <class Scalar>
@@ -56,6 +65,15 @@ struct SweepKernels
                     Scalar* r, Scalar* z);
   /// p := z + beta p.
   void (*turn)(int points, double beta, const Scalar* z, Scalar* p);
+  /// z := ((D + L) D^-1 (D + L^T))^-1 z.
+  void (*precondition)(const SweptMatrix<Scalar>& matrix, Scalar* z);
+  /// y += (D + L + L^T) x. Returns x . y.
+  double (*multiply)(const SweptMatrix<Scalar>& matrix, const Scalar* x, Scalar* y);
+  /// y += factor C x.
+  void (*addRows)(const PointRows<Scalar>& c, double factor, const Scalar* x, Scalar* y);
+  /// x += alpha p, r -= alpha q, z = r.
+  void (*move)(int points, double alpha, const Scalar* p, const Scalar* q, Scalar* x, Scalar* r, Scalar* z);
+  double (*dot)(int points, const Scalar* x, const Scalar* y);
 };
 
 struct PointKernels

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "island/average_projection.h"
+#include "linalg/average_projection.h"
 #include "scene_parts.h"
 #include "scene_rod.h"
 #include "slender_sim/scene/shapes.h"
@@ -95,12 +95,10 @@ void placeOnGuide(const SceneConfig& scene, int r, const RodModel& model, GuideS
   }
   const Eigen::Matrix3Xd away = constraints.averages(guide.points) - nodes * constraints.matrix().transpose(),
                          speeds = constraints.averages(guide_velocities);
-  velocities.setZero(3, nodes.cols());
-  for (int k = 0; k < 3; ++k)
-  {
-    nodes.row(k) += projection.displacements(away.row(k).transpose()).transpose();
-    velocities.row(k) = projection.displacements(speeds.row(k).transpose()).transpose();
-  }
+  Eigen::Matrix3Xd moved;
+  fromPoints(projection.displacements(away), moved);
+  nodes += moved;
+  fromPoints(projection.displacements(speeds), velocities);
 }
 
 void addGrasps(SceneConfig& scene, int r, const RodModel& model, RodState& state, std::vector<GraspRef>& grasps)
