@@ -13,6 +13,25 @@ constexpr long kFlops = 600;   // of dense matrices, to a count of a WorkBudget
 
 }   // namespace
 
+/// Factors what preconditions, where it has changed. Returns false if averages depend on each other.
+bool AveragedClothSolver::prepareBounded()
+{
+  AverageBounds& b = *bounds_;
+  if (system_.viscosity() != b.ratio || system_.weights() != b.inertia || system_.held() != b.held)
+  {
+    b.inertia = system_.weights();
+    b.held = system_.held();
+    b.ratio = system_.viscosity();
+    b.definite = b.constant.factor(b.inertia, 1.0 + b.ratio, b.held);
+    for (AverageSet& set : average_sets_)
+      set.factored = false;
+  }
+  if (b.definite && !used_->factored)
+    b.independent = used_->bounded.factor(b.constant.factorization(), b.held.data());
+  used_->factored = true;
+  return b.independent;
+}
+
 /// As solve() of a linearised step, but forces of averages are at most their bounds: what the step minimises gets bound
 /// times |target - average| for each instead of the condition that both are the same. An average is either met, or its
 /// force is at the bound and points from it to its target. Where no bound is reached that is solve().
@@ -41,7 +60,7 @@ LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Mat
       return LinearOutcome::solved;
     d = b.first_guess;
   }
-  else if (!independent() || !preconditioned_)
+  else if (!independent() || !b.definite)
     return LinearOutcome::not_definite;
   std::fill(b.pulls.begin(), b.pulls.end(), 0.0);
   // of what the bounds could do: forces far below them, of a shell at rest, are rounding errors
@@ -172,7 +191,7 @@ void AveragedClothSolver::setBoundedGap(const PointVector& d, const Eigen::Matri
 LinearResult AveragedClothSolver::solveBoundedStep(double tolerance, int most)
 {
   AverageBounds& b = *bounds_;
-  return cg_.solve(
+  return b.cg.solve(
       right_, b.before, tolerance, most,
       [&](const PointVector& p, PointVector& ap) {
         system_.applyMatrix(p, ap);

@@ -7,7 +7,7 @@
 namespace slender {
 
 AveragedClothSolver::AveragedClothSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system)
-  : ClothLinearSolver(options, system),
+  : ClothLinearSolver(system, options.linear_tolerance),
     mass_(model.mass)
 {
   average_sets_.reserve(model.averages.size());
@@ -16,12 +16,13 @@ AveragedClothSolver::AveragedClothSolver(const ClothModel& model, const ClothOpt
   sweeps_.setPattern(system.matrix(), system.constantMatrix());
   if (model.averages[0].bounds.size() > 0)
   {
-    usePreconditioner(model);
     for (AverageSet& set : average_sets_)
       set.bounded.setConstraints(*set.prescribed->weights);
     bounds_ = std::make_unique<AverageBounds>();
     bounds_->first_guess = bounds_->before = bounds_->image = bounds_->image_before =
         PointVector(4 * static_cast<std::size_t>(points()), 0.0);
+    bounds_->constant = ShiftedMatrix(constantStiffness(model, system.terms()));
+    bounds_->cg.resize(4 * static_cast<std::size_t>(points()));
   }
   use(average_sets_[0]);
 }
@@ -58,20 +59,11 @@ void AveragedClothSolver::beginStage()
     if (used_->independent)
       sweeps_.setAverages(used_->projection);
   }
-  if (!bounds_)
-    return;
-  if (updatePreconditioner())
-    for (AverageSet& set : average_sets_)
-      set.factored = false;
-  if (!preconditioned_ || used_->factored)
-    return;
-  used_->independent =
-      used_->bounded.factor(preconditioner_->constant().factorization(), system_.held().data()) && used_->independent;
-  used_->factored = true;
+  if (bounds_)
+    used_->independent = prepareBounded() && used_->independent;
 }
 
-LinearOutcome AveragedClothSolver::solve(PointVector& d, const PointVector*, long& linear_iterations, long&,
-                                         double tolerance)
+LinearOutcome AveragedClothSolver::solve(PointVector& d, long& linear_iterations, long&, double tolerance)
 {
   if (!independent())
     return LinearOutcome::not_definite;

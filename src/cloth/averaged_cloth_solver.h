@@ -1,6 +1,7 @@
 #pragma once
 
 #include "cloth_linear_solver.h"
+#include "shifted_matrix.h"
 #include "linalg/projected_sweeps.h"
 #include "slender_sim/linalg/constrained_cholesky.h"
 
@@ -26,8 +27,7 @@ public:
 
   void beginStage() override;
   /// Averages stay what the first guess makes them.
-  LinearOutcome solve(PointVector& d, const PointVector* at, long& linear_iterations, long& factorizations,
-                      double tolerance = 0.0) override;
+  LinearOutcome solve(PointVector& d, long& linear_iterations, long& factorizations, double tolerance = 0.0) override;
   /// The same, but the points x + d, x the start of the stage, get these averages (3 x count).
   LinearOutcome solveTo(const Eigen::Matrix3Xd& averages, PointVector& d, long& linear_iterations);
   /// The same for a linearised step of a model with bounds of its averages' forces. `at_bound`: which were, and are, at
@@ -47,7 +47,7 @@ private:
     explicit AverageSet(const PrescribedAverages& of) : prescribed(&of), projection(*of.weights) {}
     const PrescribedAverages* prescribed;
     AverageProjection projection;
-    ConstrainedCholesky bounded;   ///< of the preconditioner, with bounds only
+    ConstrainedCholesky bounded;   ///< beside AverageBounds::constant, with bounds only
     bool factored = false;         ///< `bounded`, with the present one
     bool independent = true;       ///< with what is held
   };
@@ -60,12 +60,20 @@ private:
     /// of minimizeBounded(): directions of forces at their bounds, else zero; forces; what they are to a motion
     PointVector wanted, bounded, response;
     Eigen::VectorXd stiffness, weights;   ///< [N/m]
+    /// What preconditions: inertia and constantStiffness(), and what it was factored for.
+    ShiftedMatrix constant;
+    bool definite = false, independent = true;
+    std::vector<double> inertia;
+    std::vector<char> held;
+    double ratio = -1.0;
+    ConjugateGradients cg;
   };
 
   void use(AverageSet& set);
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   LinearOutcome search(PointVector& d, double tolerance, double load, long& linear_iterations);
+  bool prepareBounded();
   LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference,
                                    long& linear_iterations);
   LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,

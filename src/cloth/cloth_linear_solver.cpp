@@ -9,49 +9,23 @@ constexpr double kBesideLoad = 1e-2;
 
 }   // namespace
 
-ClothSolver solverOf(const ClothOptions& options)
+ClothLinearSolver::ClothLinearSolver(const ClothOptions& options, ClothSystem& system)
+  : ClothLinearSolver(system, options.linear_tolerance)
 {
-  return options.solver == ClothSolver::automatic ? ClothSolver::gauss_seidel : options.solver;
-}
-
-ClothLinearSolver::ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system)
-  : ClothLinearSolver(options, system)
-{
+  kind_ = options.solver;
   if (kind_ == ClothSolver::cholesky)
     factor_.setPattern(system.matrix());
-  else if (kind_ == ClothSolver::gauss_seidel)
-    sweeps_.setPattern(system.matrix(), system.constantMatrix());
   else
-    usePreconditioner(model);
+    sweeps_.setPattern(system.matrix(), system.constantMatrix());
 }
 
-ClothLinearSolver::ClothLinearSolver(const ClothOptions& options, ClothSystem& system)
+ClothLinearSolver::ClothLinearSolver(ClothSystem& system, double tolerance)
   : system_(system),
-    linear_tolerance_(options.linear_tolerance),
-    kind_(solverOf(options))
+    linear_tolerance_(tolerance)
 {
   for (PointVector* v : {&right_, &product_, &correction_})
     v->assign(4 * static_cast<std::size_t>(points()), 0.0);
 }
-
-void ClothLinearSolver::usePreconditioner(const ClothModel& model)
-{
-  preconditioner_ = std::make_unique<ClothPreconditioner>(model, system_.terms(), system_.matrix());
-  cg_.resize(4 * static_cast<std::size_t>(points()));
-}
-
-bool ClothLinearSolver::updatePreconditioner()
-{
-  if (!preconditioner_ || (system_.viscosity() == ratio_ && system_.weights() == weights_ && system_.held() == held_))
-    return false;
-  weights_ = system_.weights();
-  held_ = system_.held();
-  ratio_ = system_.viscosity();
-  preconditioned_ = preconditioner_->setConstant(weights_, 1.0 + ratio_, held_);
-  return true;
-}
-
-void ClothLinearSolver::beginStage() { updatePreconditioner(); }
 
 bool ClothLinearSolver::factor()
 {
@@ -79,8 +53,7 @@ void ClothLinearSolver::setRight(const PointVector& d)
   clearHeld(right_);
 }
 
-LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, long& linear_iterations,
-                                       long& factorizations, double tolerance)
+LinearOutcome ClothLinearSolver::solve(PointVector& d, long& linear_iterations, long& factorizations, double tolerance)
 {
   const std::vector<char>& held = system_.held();
   // what is held moves as given, and so does the rest in the first guess; the right-hand side sees that
@@ -100,24 +73,8 @@ LinearOutcome ClothLinearSolver::solve(PointVector& d, const PointVector* at, lo
     return LinearOutcome::solved;
   }
   const double allowed = tolerance > 0 ? tolerance : linear_tolerance_;
-  if (kind_ == ClothSolver::gauss_seidel)
-  {
-    sweeps_.set(1.0 + system_.viscosity(), held);
-    return correct(d, sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostLinearIterations)), allowed,
-                   0.0, linear_iterations);
-  }
-  if (!preconditioned_)
-    return LinearOutcome::not_definite;
-  if (at)
-    preconditioner_->align(*at, system_.matrix(), held);
-  else
-    preconditioner_->useConstant();
-  const auto apply = [this](const PointVector& p, PointVector& ap) {
-    system_.applyMatrix(p, ap);
-    clearHeld(ap);
-  };
-  const LinearResult result = cg_.solve(right_, correction_, allowed, iterationsWithin(kMostLinearIterations), apply,
-                                        [&](PointVector& r, PointVector& z) { preconditioner_->apply(r, z); });
+  sweeps_.set(1.0 + system_.viscosity(), held);
+  const LinearResult result = sweeps_.solve(right_, correction_, allowed, iterationsWithin(kMostLinearIterations));
   return correct(d, result, allowed, 0.0, linear_iterations);
 }
 

@@ -1,12 +1,9 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
 #include <vector>
 
-#include "cloth_preconditioner.h"
 #include "cloth_system.h"
-#include "slender_sim/linalg/conjugate_gradients.h"
 #include "slender_sim/linalg/sparse_cholesky.h"
 #include "linalg/symmetric_sweeps.h"
 
@@ -20,45 +17,36 @@ enum class LinearOutcome
   not_converged   ///< the most iterations that are taken did not reach the tolerance
 };
 
-/// The solver that the options mean: never `automatic`.
-ClothSolver solverOf(const ClothOptions& options);
-
 /// Solves the Newton equations H d = -gradient of a ClothSystem, with what is held moving as given. Without prescribed
 /// averages; AveragedClothSolver is for those.
 class ClothLinearSolver
 {
 public:
-  /// Model and system must outlive this. For ClothSolver::cholesky the blocks of the system contain its constant
-  /// matrix.
-  ClothLinearSolver(const ClothModel& model, const ClothOptions& options, ClothSystem& system);
+  /// The system must outlive this. For ClothSolver::cholesky its blocks contain its constant matrix.
+  ClothLinearSolver(const ClothOptions& options, ClothSystem& system);
   virtual ~ClothLinearSolver() = default;
 
   ClothSolver kind() const { return kind_; }
   /// What solves spend; must outlive this.
   void useBudget(WorkBudget& budget) { budget_ = &budget; }
   /// Comes after beginStage() of the system.
-  virtual void beginStage();
+  virtual void beginStage() {}
 
   /// Factors the matrix (Cholesky only). Returns false where it is not positive definite on what is not held.
   bool factor();
   /// v := matrix^-1 v after a factor() that returned true. Held points of v must be zero and stay so.
   void solveFactored(PointVector& v) const { factor_.solvePoints(v.data(), v.data()); }
-  /// `d` holds what held points move by, and for conjugate gradients the first guess of the others. `at`: where the
-  /// matrix is from, for conjugate gradients that are preconditioned along the normals there; null: by the constant
-  /// matrix. `tolerance`: theirs, 0: that of the options. The numbers grow by what was needed.
-  virtual LinearOutcome solve(PointVector& d, const PointVector* at, long& linear_iterations, long& factorizations,
-                              double tolerance = 0.0);
+  /// `d` holds what held points move by, and for sweeps the first guess of the others. `tolerance`: theirs, 0: that of
+  /// the options. The numbers grow by what was needed.
+  virtual LinearOutcome solve(PointVector& d, long& linear_iterations, long& factorizations, double tolerance = 0.0);
 
 protected:
-  /// For solvers of their own.
-  ClothLinearSolver(const ClothOptions& options, ClothSystem& system);
-  void usePreconditioner(const ClothModel& model);
+  /// For a class that solves by sweeps of its own.
+  ClothLinearSolver(ClothSystem& system, double tolerance);
 
   static constexpr int kMostLinearIterations = 2000;   ///< of conjugate gradients
 
   int points() const { return system_.points(); }
-  /// Makes the constant part of the preconditioner that of the stage. Returns whether it has changed.
-  bool updatePreconditioner();
   void clearHeld(PointVector& v) const;
   /// right_: what d leaves of the equations, held points zero.
   void setRight(const PointVector& d);
@@ -78,19 +66,12 @@ protected:
   const double linear_tolerance_;
   WorkBudget unbounded_;
   WorkBudget* budget_ = &unbounded_;
-  std::unique_ptr<ClothPreconditioner> preconditioner_;   ///< of conjugate gradients
-  bool preconditioned_ = true;                            ///< its constant part could be factored
-  ConjugateGradients cg_;
   PointVector right_, product_, correction_;
 
 private:
-  const ClothSolver kind_;
+  ClothSolver kind_ = ClothSolver::gauss_seidel;
   SparseCholesky factor_;   ///< of the system's matrix
   SymmetricSweeps sweeps_;
-  /// What the preconditioner was made for.
-  std::vector<double> weights_;
-  std::vector<char> held_;
-  double ratio_ = -1;
 };
 
 }   // namespace slender

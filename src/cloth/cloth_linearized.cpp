@@ -6,7 +6,7 @@ namespace slender {
 LinearOutcome ClothWork::solveNewton(PointVector& d, bool linearized, StepReport& counts)
 {
   if (!averages || !linearized)
-    return linear->solve(d, linearized ? nullptr : &x, counts.linear_iterations, counts.factorizations);
+    return linear->solve(d, counts.linear_iterations, counts.factorizations);
   return averages->bounded() ? averages->solveBounded(d, averages_, at_bound_, counts.linear_iterations)
                              : averages->solveTo(averages_, d, counts.linear_iterations);
 }

@@ -27,8 +27,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
     for (int i = 0; i < model->vertices(); ++i)
       point(system->gradient(), i) = -forces.col(i);
     std::fill(d_.begin(), d_.end(), 0.0);
-    return linear->solve(d_, options.one_newton_step ? nullptr : &x, iterations, factorizations, kTolerance) ==
-           LinearOutcome::solved;
+    return linear->solve(d_, iterations, factorizations, kTolerance) == LinearOutcome::solved;
   };
   if (!solve())   // the inertia of a longer step does not hold up what a short stage's does
   {

@@ -90,7 +90,6 @@ bool ClothStepper::respond(const Eigen::Matrix3Xd& forces, double duration, Eige
 const Eigen::Matrix3Xd& ClothStepper::pinForces() const { return impl_->pin_forces; }
 double ClothStepper::stableStep() const { return impl_->stableStep(); }
 const Eigen::Matrix3Xd& ClothStepper::averageForces() const { return impl_->average_forces; }
-ClothSolver ClothStepper::solver() const { return impl_->linear->kind(); }
 const ClothModel& ClothStepper::model() const { return *impl_->model; }
 
 ClothEnergies ClothStepper::energies(const ClothState& state, const Eigen::Vector3d& gravity) const

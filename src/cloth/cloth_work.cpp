@@ -44,7 +44,7 @@ ClothWork::ClothWork(std::shared_ptr<const ClothModel> m, const ClothOptions& o,
       throw std::invalid_argument(who + "a set of averages is empty: leave it out");
     if (o.integrator != Integrator::implicit_euler)
       throw std::invalid_argument(who + "prescribed averages need time.integrator: implicit_euler");
-    if (o.solver == ClothSolver::cholesky || o.solver == ClothSolver::conjugate_gradients)
+    if (o.solver == ClothSolver::cholesky)
       throw std::invalid_argument(who + "prescribed averages need solver.linear: gauss_seidel (or auto)");
     if ((set.bounds.size() > 0) != (model->averages[0].bounds.size() > 0))
       throw std::invalid_argument(who +
@@ -70,12 +70,11 @@ ClothWork::ClothWork(std::shared_ptr<const ClothModel> m, const ClothOptions& o,
 
 void ClothWork::buildSystem(const ClothModel& of)
 {
-  const ClothSolver kind = solverOf(options);
   linear.reset();
-  system = std::make_unique<ClothSystem>(of, kind == ClothSolver::cholesky);
+  system = std::make_unique<ClothSystem>(of, options.solver == ClothSolver::cholesky);
   averages = nullptr;
   if (of.averages.empty() || !with_averages_)
-    linear = std::make_unique<ClothLinearSolver>(of, options, *system);
+    linear = std::make_unique<ClothLinearSolver>(options, *system);
   else
   {
     auto averaged = std::make_unique<AveragedClothSolver>(of, options, *system);

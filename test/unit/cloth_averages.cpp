@@ -318,11 +318,8 @@ TEST(ClothAverages, RefuseWhatCannotBe)
   o.integrator = Integrator::symplectic_euler;
   EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
   o = trackingOptions(false);
-  for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::conjugate_gradients})
-  {
-    o.solver = solver;
-    EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
-  }
+  o.solver = ClothSolver::cholesky;
+  EXPECT_THROW(ClothStepper(t.model, o), std::invalid_argument);
   // held vertices that leave nothing of an average
   Tracked held;
   pinVertices(held.state, [&] {

@@ -375,8 +375,7 @@ TEST(FailedSteps, RefusalsOfClothsLeaveNothing)
   for (const BendingModel bending : {BendingModel::hinge, BendingModel::isometric_nonconforming})
     for (const Integrator integrator :
          {Integrator::implicit_euler, Integrator::tr_bdf2, Integrator::imex, Integrator::symplectic_euler})
-      for (const ClothSolver solver :
-           {ClothSolver::cholesky, ClothSolver::conjugate_gradients, ClothSolver::gauss_seidel})
+      for (const ClothSolver solver : {ClothSolver::cholesky, ClothSolver::gauss_seidel})
         for (const bool one_newton_step : {false, true})
           for (const bool touching : {false, true})
           {

@@ -28,30 +28,21 @@ struct ClothEnergies
   double total() const { return membrane + bending + kinetic + gravity; }
 };
 
+/// Of the linear equations (measured: study implicit_step).
 enum class ClothSolver
 {
-  /// conjugate_gradients with averages, else gauss_seidel (measured: study implicit_step). Steps with one_newton_step
-  /// and averages without bounds, up to 3,000 vertices and no more than one average per 50 of them, are swept as well,
-  /// but for plates (tracking_overhead).
-  automatic,
-  cholesky,   ///< factorisation of the whole matrix
-              /// preconditioned by a constant matrix of points (mass, rest membrane); for full Newton also along the
-              /// normals
-  conjugate_gradients,
-  gauss_seidel   ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps; no prescribed averages
+  cholesky,      ///< factorisation of the whole matrix; no prescribed averages
+  gauss_seidel   ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps
 };
 
 /// Says how the equations of a cloth are solved.
 struct ClothSolving
 {
   bool one_newton_step = false;   ///< implicit stages: linearised about their start [Baraff & Witkin 1998]
-  ClothSolver solver = ClothSolver::automatic;
-  /// Of conjugate gradients: last over first residual, in the preconditioner's norm (0, 1). The first one is that of
-  /// unchanged velocity. With averages and one_newton_step it is that of the same cloth without them, and of what it
-  /// takes to move them, unless strains are so large that these say nothing about motions. Where steps with averages
-  /// are swept, it is that of the same cloth without them (or of a tenth of what it takes to move them), in the sweeps'
-  /// norm, before the averages are met: positions are as good as those of the same cloth without averages, averages
-  /// exact, their forces often less so than by conjugate_gradients.
+  ClothSolver solver = ClothSolver::gauss_seidel;
+  /// Of sweeps: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged
+  /// velocity. With averages and one_newton_step it is that of the same cloth without them, and of what it takes to
+  /// move them, or of ten times what is left, where that is less.
   double linear_tolerance = 5e-3;
 };
 
@@ -119,8 +110,6 @@ public:
   const Eigen::Matrix3Xd& averageForces() const;
 
   ClothEnergies energies(const ClothState& state, const Eigen::Vector3d& gravity) const;
-  /// What `automatic` took; steps with averages may be swept beside conjugate_gradients.
-  ClothSolver solver() const;
   const ClothModel& model() const;
 
   /// For the world, which steps its objects together.

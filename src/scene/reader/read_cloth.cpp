@@ -335,12 +335,13 @@ void readClothTraits(YamlMap& map, const ReadContext& context, ClothConfig& clot
   YamlMap solver(map.get("solver", "Settings of the implicit solver of the cloth.").sharesKeysOf("cloths.N.solver"));
   solver.get(
       "linear", cloth.solver,
-      {{"auto", ClothSolver::automatic},
-       {"cholesky", ClothSolver::cholesky},
-       {"conjugate_gradients", ClothSolver::conjugate_gradients},
-       {"gauss_seidel", ClothSolver::gauss_seidel}},
-      "Solver of the linear equations: gauss_seidel and conjugate_gradients solve to `tolerance`, cholesky exactly. "
-      "Without the key, or with auto, it is chosen by one_newton_step, the number of vertices, and what is tracked.");
+      {{"gauss_seidel", ClothSolver::gauss_seidel},
+       {"auto", ClothSolver::gauss_seidel},
+       {"conjugate_gradients", ClothSolver::gauss_seidel},
+       {"cholesky", ClothSolver::cholesky}},
+      "Solver of the linear equations. gauss_seidel: conjugate gradients to `tolerance`, preconditioned by symmetric "
+      "Gauss-Seidel sweeps; auto and conjugate_gradients mean the same. cholesky: exactly, and not for tracked cloth. "
+      "Without the key: gauss_seidel.");
   solver.get("tolerance", cloth.linear_tolerance, Range::between(0, 1),
              "Relative residual to which the linear equations are solved. Without the key: 0.005.");
   solver.get("one_newton_step", cloth.one_newton_step,

@@ -60,18 +60,16 @@ struct Method
 
 constexpr Method kMethods[] = {
     {"implicit, Newton, cholesky", Integrator::implicit_euler, false, ClothSolver::cholesky},
-    {"implicit, Newton, conjugate gradients", Integrator::implicit_euler, false, ClothSolver::conjugate_gradients},
+    {"implicit, Newton, sweeps", Integrator::implicit_euler, false, ClothSolver::gauss_seidel},
     {"implicit, one step, cholesky", Integrator::implicit_euler, true, ClothSolver::cholesky},
-    {"implicit, one step, conjugate gradients to 0.02", Integrator::implicit_euler, true,
-     ClothSolver::conjugate_gradients, 0.02},
-    {"implicit, one step, conjugate gradients", Integrator::implicit_euler, true, ClothSolver::conjugate_gradients},
-    {"implicit, one step, conjugate gradients to 1e-3", Integrator::implicit_euler, true,
-     ClothSolver::conjugate_gradients, 1e-3},
+    {"implicit, one step, sweeps to 0.02", Integrator::implicit_euler, true, ClothSolver::gauss_seidel, 0.02},
+    {"implicit, one step, sweeps", Integrator::implicit_euler, true, ClothSolver::gauss_seidel},
+    {"implicit, one step, sweeps to 1e-3", Integrator::implicit_euler, true, ClothSolver::gauss_seidel, 1e-3},
     {"TR-BDF2, Newton, cholesky", Integrator::tr_bdf2, false, ClothSolver::cholesky},
-    {"TR-BDF2, Newton, conjugate gradients", Integrator::tr_bdf2, false, ClothSolver::conjugate_gradients},
-    {"TR-BDF2, one step, conjugate gradients", Integrator::tr_bdf2, true, ClothSolver::conjugate_gradients},
-    {"IMEX", Integrator::imex, false, ClothSolver::automatic},
-    {"explicit", Integrator::symplectic_euler, false, ClothSolver::automatic}};
+    {"TR-BDF2, Newton, sweeps", Integrator::tr_bdf2, false, ClothSolver::gauss_seidel},
+    {"TR-BDF2, one step, sweeps", Integrator::tr_bdf2, true, ClothSolver::gauss_seidel},
+    {"IMEX", Integrator::imex, false, ClothSolver::gauss_seidel},
+    {"explicit", Integrator::symplectic_euler, false, ClothSolver::gauss_seidel}};
 
 }   // namespace
 

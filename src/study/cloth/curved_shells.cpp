@@ -127,7 +127,7 @@ struct Setting
 {
   const char* name;
   Integrator integrator = Integrator::implicit_euler;
-  ClothSolver solver = ClothSolver::automatic;
+  ClothSolver solver = ClothSolver::gauss_seidel;
   bool one_newton_step = false;
   double step = 0.02;
   double damping = 0.0;   ///< by stiffness [s]
@@ -136,10 +136,9 @@ struct Setting
 const Setting kSettings[] = {
     {"implicit_euler"},
     {"implicit_euler, cholesky", Integrator::implicit_euler, ClothSolver::cholesky},
-    {"implicit_euler, conjugate_gradients", Integrator::implicit_euler, ClothSolver::conjugate_gradients},
-    {"one_newton_step", Integrator::implicit_euler, ClothSolver::automatic, true},
-    {"tr_bdf2, damped", Integrator::tr_bdf2, ClothSolver::automatic, false, 0.02, 1e-3},
-    {"symplectic_euler", Integrator::symplectic_euler, ClothSolver::automatic, false, 2.5e-4}};
+    {"one_newton_step", Integrator::implicit_euler, ClothSolver::gauss_seidel, true},
+    {"tr_bdf2, damped", Integrator::tr_bdf2, ClothSolver::gauss_seidel, false, 0.02, 1e-3},
+    {"symplectic_euler", Integrator::symplectic_euler, ClothSolver::gauss_seidel, false, 2.5e-4}};
 
 SceneConfig sceneOf(const RestShape& shape, BendingModel bending, const Setting& setting)
 {

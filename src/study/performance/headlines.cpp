@@ -166,7 +166,7 @@ const HeadlineRegistration kThesis{{
      {{"implicit_step_speedup_min"}},
      {1.0, " times", 3},
      "thesis table 2.1: 2.1 to 3.4 times",
-     "Both models spend most of a step in conjugate gradients with one preconditioner, so that the choice of model "
+     "Both models spend most of a step in conjugate gradients, so that the choice of model "
      "hardly changes the time."},
     {"ibm_vs_hinge",
      "the same, over hinges with a factored matrix",

@@ -117,9 +117,8 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   constexpr int kTimed = 5;   // iterations
   const int n = hinged.model->vertices();
   ClothOptions options = linearized();
-  options.solver = ClothSolver::conjugate_gradients;
   ClothSystem system(*hinged.model, false);
-  ClothLinearSolver solver(*hinged.model, options, system);
+  ClothLinearSolver solver(options, system);
   PointVector x, ahead, rest, guess, right(4 * n, 0.0), product(4 * n, 0.0), correction(4 * n, 0.0), exact(4 * n, 0.0),
       away(4 * n, 0.0);
   toPoints(hinged.state.x, x);
@@ -168,7 +167,7 @@ UsualSolvers usualSolvers(const ClothSetup& hinged, double limit)
   };
   PointVector moved = guess;
   long iterations = 0, factorizations = 0;
-  solver.solve(moved, nullptr, iterations, factorizations);
+  solver.solve(moved, iterations, factorizations);
   for (std::size_t i = 0; i < moved.size(); ++i)
     moved[i] -= guess[i];
   const double allowed = error(moved);
