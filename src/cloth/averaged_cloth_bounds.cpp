@@ -13,8 +13,8 @@ constexpr long kFlops = 600;   // of dense matrices, to a count of a WorkBudget
 
 }   // namespace
 
-/// Factors what preconditions, where it has changed. Returns false if averages depend on each other.
-bool AveragedClothSolver::prepareBounded()
+/// Factors what preconditions, where it has changed.
+void AveragedClothSolver::prepareBounded()
 {
   AverageBounds& b = *bounds_;
   if (system_.viscosity() != b.ratio || system_.weights() != b.inertia || system_.held() != b.held)
@@ -26,10 +26,10 @@ bool AveragedClothSolver::prepareBounded()
     for (AverageSet& set : average_sets_)
       set.factored = false;
   }
-  if (b.definite && !used_->factored)
-    b.independent = used_->bounded.factor(b.constant.factorization(), b.held.data());
+  if (!b.definite || used_->factored)
+    return;
+  used_->independent_bounded = used_->bounded.factor(b.constant.factorization(), b.held.data());
   used_->factored = true;
-  return b.independent;
 }
 
 /// As solve() of a linearised step, but forces of averages are at most their bounds: what the step minimises gets bound
@@ -40,6 +40,8 @@ LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Mat
 {
   AverageBounds& b = *bounds_;
   const Eigen::VectorXd& most = used_->prescribed->bounds;
+  if (!independent() || !b.definite)
+    return LinearOutcome::not_definite;
   b.at.clear();
   used_->projection.leaveOut(b.at);
   if (at_bound.empty())
@@ -60,8 +62,6 @@ LinearOutcome AveragedClothSolver::solveBounded(PointVector& d, const Eigen::Mat
       return LinearOutcome::solved;
     d = b.first_guess;
   }
-  else if (!independent() || !b.definite)
-    return LinearOutcome::not_definite;
   std::fill(b.pulls.begin(), b.pulls.end(), 0.0);
   // of what the bounds could do: forces far below them, of a shell at rest, are rounding errors
   constexpr double kSmall = 1e-6;

@@ -35,6 +35,7 @@ void AveragedClothSolver::use(AverageSet& set)
   multipliers_ = gap_;
   if (bounds_)
   {
+    used_->projection.leaveOut({});
     bounds_->at.clear();
     bounds_->pulls = bounds_->wanted = bounds_->bounded = bounds_->response = gap_;
     bounds_->stiffness = bounds_->weights = set.prescribed->bounds;
@@ -60,7 +61,7 @@ void AveragedClothSolver::beginStage()
       sweeps_.setAverages(used_->projection);
   }
   if (bounds_)
-    used_->independent = prepareBounded() && used_->independent;
+    prepareBounded();
 }
 
 LinearOutcome AveragedClothSolver::solve(PointVector& d, long& linear_iterations, long&, double tolerance)

@@ -21,7 +21,7 @@ public:
   bool bounded() const { return bounds_ != nullptr; }
   int count() const { return used_->prescribed->count(); }
   /// False when averages depend on each other on what is not held: then nothing can be solved.
-  bool independent() const { return used_->independent; }
+  bool independent() const { return used_->independent && used_->independent_bounded; }
   /// What they are at x.
   void averagesOf(const PointVector& x, Eigen::Matrix3Xd& averages) const;
 
@@ -47,9 +47,10 @@ private:
     explicit AverageSet(const PrescribedAverages& of) : prescribed(&of), projection(*of.weights) {}
     const PrescribedAverages* prescribed;
     AverageProjection projection;
-    ConstrainedCholesky bounded;   ///< beside AverageBounds::constant, with bounds only
-    bool factored = false;         ///< `bounded`, with the present one
-    bool independent = true;       ///< with what is held
+    ConstrainedCholesky bounded;       ///< beside AverageBounds::constant, with bounds only
+    bool factored = false;             ///< `bounded`, with the present one
+    bool independent = true;           ///< with what is held, by their masses
+    bool independent_bounded = true;   ///< the same, by `bounded`
   };
   struct AverageBounds
   {
@@ -62,7 +63,7 @@ private:
     Eigen::VectorXd stiffness, weights;   ///< [N/m]
     /// What preconditions: inertia and constantStiffness(), and what it was factored for.
     ShiftedMatrix constant;
-    bool definite = false, independent = true;
+    bool definite = false;
     std::vector<double> inertia;
     std::vector<char> held;
     double ratio = -1.0;
@@ -73,7 +74,7 @@ private:
   /// gap_: by how much the averages at x fall short.
   void setGap(const Eigen::Matrix3Xd& averages, const PointVector& x);
   LinearOutcome search(PointVector& d, double tolerance, double load, long& linear_iterations);
-  bool prepareBounded();
+  void prepareBounded();
   LinearOutcome stepTowardsBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double& reference,
                                    long& linear_iterations);
   LinearOutcome minimizeBounded(PointVector& d, const Eigen::Matrix3Xd& averages, double reference,

@@ -19,8 +19,6 @@ public:
   /// y += (diag(w) + c A) x, held points as all others.
   void addProduct(const double* x, double* y) const;
   void solve(const PointVector& b, PointVector& x) const { factor_.solvePoints(b.data(), x.data()); }
-  const PointMatrix& pattern() const { return a_; }
-  const double* values() const { return values_.data(); }
   const SparseCholesky& factorization() const { return factor_; }
 
 private:

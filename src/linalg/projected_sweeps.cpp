@@ -154,24 +154,15 @@ double ProjectedSweeps::norm(const PointVector& r)
   const double size = largestEntry(r);
   if (size == 0)
     return 0.0;
-  pack(single_, nullptr);
   residual_ = r;
-  const double square = load(single_, size, false);
+  pack(single_, nullptr);
+  double square = load(single_, size, false);
+  if (!(square >= 0))   // It may be a rounding error.
+  {
+    pack(double_, nullptr);
+    square = load(double_, size, false);
+  }
   return square >= 0 ? std::sqrt(square) * size : square;
-}
-
-/// What a curvature that is not positive means: in single precision it may be a rounding error.
-template <class Scalar>
-ProjectedSweeps::SearchEnd ProjectedSweeps::negative(const Search<Scalar>& s, double curvature) const
-{
-  if (std::is_same_v<Scalar, double>)
-    return SearchEnd::not_definite;
-  double sum = 0.0;   // p . D p
-  for (std::size_t v = 0; v < s.p.size() / 4; ++v)
-    for (int c = 0; c < 3; ++c)
-      for (int r = 0; r < 3; ++r)
-        sum += static_cast<double>(s.p[4 * v + r]) * s.matrix.diagonal[12 * v + 4 * c + r] * s.p[4 * v + c];
-  return curvature < -Search<Scalar>::kLeast * sum ? SearchEnd::not_definite : SearchEnd::stalled;
 }
 
 /// Iterates from what load() has left, until the norm is `tolerance` times `scale`.
@@ -188,12 +179,12 @@ ProjectedSweeps::SearchEnd ProjectedSweeps::iterate(Search<Scalar>& s, double sq
     std::fill(s.q.begin(), s.q.end(), Scalar(0));
     const double curvature = kernels.multiply(matrix, s.p.data(), s.q.data());
     if (!(curvature > 0))
-      return negative(s, curvature);
+      return kNegative<Scalar>;
     takeOut(s, s.of_forces, s.forces, s.q);
     kernels.move(n, square / curvature, s.p.data(), s.q.data(), s.x.data(), s.r.data(), s.z.data());
     const double next = precondition(s, true);
     if (!(next >= 0))
-      return SearchEnd::stalled;
+      return kNegative<Scalar>;
     kernels.turn(n, next / square, s.z.data(), s.p.data());
     square = next;
     norm = std::sqrt(square) / scale;
@@ -215,16 +206,18 @@ ProjectedSweeps::SearchEnd ProjectedSweeps::refine(Search<Scalar>& s, PointVecto
   for (double before = std::numeric_limits<double>::infinity();;)
   {
     takeOut(residual_);
-    const double size = largestEntry(residual_), square = size > 0 ? load(s, size, true) : 0.0;
+    const double size = largestEntry(residual_), square = size == 0 ? 0.0 : load(s, size, true);
     if (!(square >= 0))
-      return std::is_same_v<Scalar, float> ? SearchEnd::stalled : SearchEnd::not_definite;
+      return kNegative<Scalar>;
     const double norm = std::sqrt(square) * size;
     if (result.scale == 0)
       result.scale =
           reference > 0 ? std::max(std::min(reference, kLeft / tolerance * norm), kRounding * reference) : norm;
     result.residual = result.scale > 0 ? norm / result.scale : 0.0;
-    if (result.residual <= tolerance || result.iterations >= max_iterations || stepsInterrupted())
+    if (result.residual <= tolerance || stepsInterrupted())
       return SearchEnd::solved;
+    if (result.iterations >= max_iterations)
+      return SearchEnd::stalled;
     if (result.residual > kLeastGain * before)
       return SearchEnd::stalled;
     before = result.residual;
@@ -248,6 +241,7 @@ LinearResult ProjectedSweeps::solve(const PointVector& right_hand_side, PointVec
                                     int max_iterations, double load)
 {
   constexpr double kLeastInSinglePrecision = 1e-6;   // More accurate solutions would need several searches.
+  constexpr int kShareOfSinglePrecision = 4;         // Stiff matrices converge in double precision alone.
   [[maybe_unused]] const FlushDenormals flush;       // Tiny numbers arise far from where forces act.
   LinearResult result;
   std::fill(x.begin(), x.end(), 0.0);
@@ -256,7 +250,7 @@ LinearResult ProjectedSweeps::solve(const PointVector& right_hand_side, PointVec
   residual_ = right_;
   SearchEnd end = SearchEnd::stalled;
   if (tolerance >= kLeastInSinglePrecision)
-    end = refine(single_, x, tolerance, max_iterations, load, result);
+    end = refine(single_, x, tolerance, max_iterations / kShareOfSinglePrecision, load, result);
   if (end == SearchEnd::stalled)
   {
     std::fill(x.begin(), x.end(), 0.0);

@@ -27,8 +27,9 @@ public:
   /// Of a load as if there were no averages: sqrt(r . P r) with the preconditioner P; negative or not a number where
   /// the matrix is not definite. For one after set().
   double norm(const PointVector& r);
-  /// As ConjugateGradients::solve, but the tolerance counts from `load` if that is positive: less near equilibrium,
-  /// where a load that the averages hold stays and errors of one step must not outlive the next.
+  /// As ConjugateGradients::solve, but the tolerance counts from `load` if that is positive. A tenth of what is left at
+  /// the start is the most that may be left: near equilibrium a load that the averages hold stays, and errors of one
+  /// step must not outlive the next.
   LinearResult solve(const PointVector& right_hand_side, PointVector& x, double tolerance, int max_iterations,
                      double load);
 
@@ -60,6 +61,9 @@ private:
     stalled,
     not_definite
   };
+  /// What a curvature or square means that is negative or not a number: in single precision it may be a rounding error.
+  template <class Scalar>
+  static constexpr SearchEnd kNegative = std::is_same_v<Scalar, float> ? SearchEnd::stalled : SearchEnd::not_definite;
 
   template <class Scalar>
   void setRows(Search<Scalar>& s);
@@ -72,8 +76,6 @@ private:
   double precondition(Search<Scalar>& s, bool projected);
   template <class Scalar>
   double load(Search<Scalar>& s, double size, bool projected);
-  template <class Scalar>
-  SearchEnd negative(const Search<Scalar>& s, double curvature) const;
   template <class Scalar>
   SearchEnd iterate(Search<Scalar>& s, double square, double scale, double tolerance, int max_iterations,
                     LinearResult& result);

@@ -18,9 +18,9 @@ struct SweptValues
   AlignedVector<Scalar> blocks, diagonal, inverse;
 };
 
-/// The matrix A + factor B of SymmetricSweeps in the order in which sweeps visit its points. Each point comes after its
-/// neighbours of lower number, so that points visited in turn seldom wait for each other. `visit` is the number of a
-/// point in this order.
+/// The matrix A + factor B of SymmetricSweeps and ProjectedSweeps in the order in which sweeps visit its points. Each
+/// point comes after its neighbours of lower number, so that points visited in turn seldom wait for each other. `visit`
+/// is the number of a point in this order.
 class SweptBlocks
 {
 public:

@@ -46,7 +46,7 @@ const HeadlineRegistration kScaling{{
       {"exponent_tracked_contact", "tracked"}},
      {1.0, "", 3},
      "1: proportional",
-     "Contact adds little to the growth, except to that of tracked cloth, whose loads take many iterations."},
+     "Contact adds little to the growth, except where tracked cloth is pressed against a floor."},
     {"cost_model",
      "step of a million vertices by the fit",
      {{"seconds_per_step_1e6_rod", "rod"},
