@@ -115,7 +115,8 @@ template <class Scalar>
 double ProjectedSweeps::precondition(Search<Scalar>& s, bool projected)
 {
   const SweepKernels<Scalar>& kernels = pointKernels().sweeps<Scalar>();
-  if (grouped_)
+  const bool grouped = grouped_ && projected;   // Loads are measured as those of cloth without averages.
+  if (grouped)
   {
     std::fill(common_.begin(), common_.end(), 0.0);
     for (int v = 0; v < blocks_.points(); ++v)
@@ -124,7 +125,7 @@ double ProjectedSweeps::precondition(Search<Scalar>& s, bool projected)
     deflation_.solve(common_);
   }
   kernels.precondition(blocks_.matrixOf(s.matrix), s.z.data());
-  for (int v = 0; v < blocks_.points() && grouped_; ++v)
+  for (int v = 0; v < blocks_.points() && grouped; ++v)
     for (int c = 0; c < 3 && blocks_.moves()[v]; ++c)
       s.z[4 * v + c] += static_cast<Scalar>(common_[4 * deflation_.groupOf(v) + c]);
   if (projected)
@@ -200,7 +201,8 @@ ProjectedSweeps::SearchEnd ProjectedSweeps::refine(Search<Scalar>& s, PointVecto
 {
   constexpr double kLeastGain = 0.3;
   constexpr double kMargin = 0.5;       // A search that stops just below the tolerance would have to be repeated.
-  constexpr double kLeft = 0.1;         // of what is not balanced at the start
+  constexpr double kLeft = 0.2;         // of what is not balanced at the start
+  constexpr double kHeld = 3.0;         // measured, see solve()
   constexpr double kRounding = 1e-12;   // of the load
   pack(s, nullptr);
   for (double before = std::numeric_limits<double>::infinity();;)
@@ -211,8 +213,9 @@ ProjectedSweeps::SearchEnd ProjectedSweeps::refine(Search<Scalar>& s, PointVecto
       return kNegative<Scalar>;
     const double norm = std::sqrt(square) * size;
     if (result.scale == 0)
-      result.scale =
-          reference > 0 ? std::max(std::min(reference, kLeft / tolerance * norm), kRounding * reference) : norm;
+      result.scale = reference > 0 ? std::max(std::min((grouped_ ? 1.0 : kHeld) * reference, kLeft / tolerance * norm),
+                                              kRounding * reference)
+                                   : norm;
     result.residual = result.scale > 0 ? norm / result.scale : 0.0;
     if (result.residual <= tolerance || stepsInterrupted())
       return SearchEnd::solved;

@@ -42,7 +42,7 @@ struct ClothSolving
   ClothSolver solver = ClothSolver::gauss_seidel;
   /// Of sweeps: last over first residual, in the preconditioner's norm (0, 1). The first one is that of unchanged
   /// velocity. With averages and one_newton_step it is that of the same cloth without them, and of what it takes to
-  /// move them; then at most a tenth of what is left at the start may be left.
+  /// move them; then at most a fifth of what is left at the start may be left.
   double linear_tolerance = 5e-3;
 };
 
