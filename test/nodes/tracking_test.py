@@ -283,9 +283,11 @@ class Tracking(NodeCase):
         frames = self.cloths(self.write_scene("frames.yaml", '{frames: "frame_*.obj", rate: %g}' % RATE))
         played = self.cloths(self.write_scene("bag.yaml", "{bag: guide.bag}"), "--bag", self.path("run.bag"))
         again = self.cloths(self.write_scene("again.yaml", "{bag: {file: run.bag, topic: /state}}"))
+        # Stamps round to nanoseconds, and solutions in single precision to 1e-7 of a step's motion, which is about 1 mm.
+        rounding = 80 * 1e-7 * 1e-3
         for k in range(1, 81):
-            self.assertLess(distance(played[("flap", k)], frames[("flap", k)]), 1e-9, k)
-            self.assertLess(distance(vertices(self.after(1).vertices), frames[("flap", k)]), 1e-9, k)
+            self.assertLess(distance(played[("flap", k)], frames[("flap", k)]), rounding, k)
+            self.assertLess(distance(vertices(self.after(1).vertices), frames[("flap", k)]), rounding, k)
             self.assertLess(distance(again[("flap", k)], frames[("flap", k)]), 2e-3, k)   # the guide as it was at every step
         self.assertGreater(distance(played[("flap", 80)], played[("flap", 0)]), 0.03)
         for motion, expected in (("{bag: none.bag}", "none.bag"), ("{bag: {file: guide.bag, topic: /here}}", "on /here; it has: "),
