@@ -24,7 +24,8 @@ AverageProjection::AverageProjection(const Averages& c)
 bool AverageProjection::factor()
 {
   std::fill(left_out_.begin(), left_out_.end(), 0);
-  constexpr double kLeast = 1e-12;   // of the largest row: what is left of a row beside the others
+  // A row depends on the others if its pivot is a smaller share of the largest entry than this.
+  constexpr double kLeast = 1e-12;
   Averages rooted = c_;
   for (Eigen::Index i = 0; i < c_.rows(); ++i)
     for (Averages::InnerIterator entry(rooted, i); entry; ++entry)
@@ -40,7 +41,7 @@ bool AverageProjection::factor()
     }
   const std::vector<int> starts = gram_.starts();
   gram_ = PointMatrix(count(), entries);
-  if (gram_.starts() != starts)   // held points leave zeros, and the pattern is one of the averages alone
+  if (gram_.starts() != starts)   // Held points leave zeros, so that the pattern stays.
     factor_.setPattern(gram_);
   if (!factor_.factor(gram_, nullptr))
     return false;

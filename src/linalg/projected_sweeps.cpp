@@ -201,9 +201,9 @@ ProjectedSweeps::SearchEnd ProjectedSweeps::refine(Search<Scalar>& s, PointVecto
 {
   constexpr double kLeastGain = 0.3;
   constexpr double kMargin = 0.5;       // A search that stops just below the tolerance would have to be repeated.
-  constexpr double kLeft = 0.2;         // of what is not balanced at the start
-  constexpr double kHeld = 3.0;         // measured, see solve()
-  constexpr double kRounding = 1e-12;   // of the load
+  constexpr double kLeft = 0.2;         // The most that is left, as a share of the start.
+  constexpr double kHeld = 3.0;         // The comment of solve() says why.
+  constexpr double kRounding = 1e-12;   // The least scale, as a share of the load.
   pack(s, nullptr);
   for (double before = std::numeric_limits<double>::infinity();;)
   {
@@ -229,7 +229,7 @@ ProjectedSweeps::SearchEnd ProjectedSweeps::refine(Search<Scalar>& s, PointVecto
     for (int v = 0; v < blocks_.points(); ++v)
       for (int c = 0; c < 3; ++c)
         x[4 * static_cast<std::size_t>(blocks_.pointAt(v)) + c] += size * s.x[4 * v + c];
-    projection_->averagesOf(x, mu_);   // what rounding errors have moved averages by
+    projection_->averagesOf(x, mu_);   // Rounding errors have moved the averages by this.
     projection_->solve(mu_);
     projection_->addMotion(-1.0, mu_, x);
     blocks_.multiply(x, product_);

@@ -102,7 +102,7 @@ struct SparseCholesky::Impl
   std::vector<int> place;   ///< of each point (or, without points, unknown) in the order of elimination
   std::vector<Target> targets;
   int unknowns = 1;                 ///< per point
-  int multipliers = 0;              ///< the last points or, without points, unknowns
+  int multipliers = 0;              ///< The last unknowns of a matrix without points.
   cholmod_dense* right = nullptr;   ///< work space of solvePoints: for blocks
   PointVector permuted;             ///< for numbers
   SupernodalNumeric numeric;
@@ -257,9 +257,9 @@ cholmod_sparse SparseCholesky::Impl::permutedView()
   return a;
 }
 
-void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3, 0); }
+void SparseCholesky::setPattern(const BlockMatrix& matrix) { setPointPattern(matrix, 3); }
 
-void SparseCholesky::setPattern(const PointMatrix& matrix, int multipliers)
+void SparseCholesky::setPattern(const PointMatrix& matrix)
 {
   std::vector<std::pair<int, int>> pairs;
   for (int i = 0; i < matrix.size(); ++i)
@@ -269,7 +269,7 @@ void SparseCholesky::setPattern(const PointMatrix& matrix, int multipliers)
   Eigen::MatrixXi edges(2, static_cast<Eigen::Index>(pairs.size()));
   for (std::size_t k = 0; k < pairs.size(); ++k)
     edges.col(static_cast<Eigen::Index>(k)) << pairs[k].first, pairs[k].second;
-  setPointPattern(BlockMatrix(matrix.size(), {edges}), 1, multipliers);
+  setPointPattern(BlockMatrix(matrix.size(), {edges}), 1);
   // entries of the lower triangle in the order of the rows, each to the target of its block
   const BlockMatrix pattern(matrix.size(), {edges});
   const std::vector<int> map = pattern.mapOf(matrix);
@@ -280,10 +280,10 @@ void SparseCholesky::setPattern(const PointMatrix& matrix, int multipliers)
   impl_->targets.swap(targets);
 }
 
-void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns, int multipliers)
+void SparseCholesky::setPointPattern(const BlockMatrix& pattern, int unknowns)
 {
   Impl& m = *impl_;
-  m.multipliers = multipliers;
+  m.multipliers = 0;
   const int points = pattern.points(), d = unknowns;
   // order of the points, postordered, by CHOLMOD's analysis of their graph
   std::vector<int> starts = pattern.starts(), rows = pattern.rows();
@@ -403,8 +403,6 @@ void SparseCholesky::solvePoints(const double* b, double* x) const
   if (m.unknowns == 1)
   {
     forwardPoints(b, m.permuted.data());
-    for (auto k = m.place.end() - m.multipliers; k < m.place.end(); ++k)
-      point(m.permuted, *k) *= -1.0;
     backwardPoints(m.permuted.data(), x);
     return;
   }

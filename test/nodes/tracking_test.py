@@ -283,7 +283,7 @@ class Tracking(NodeCase):
         frames = self.cloths(self.write_scene("frames.yaml", '{frames: "frame_*.obj", rate: %g}' % RATE))
         played = self.cloths(self.write_scene("bag.yaml", "{bag: guide.bag}"), "--bag", self.path("run.bag"))
         again = self.cloths(self.write_scene("again.yaml", "{bag: {file: run.bag, topic: /state}}"))
-        # Stamps round to nanoseconds, and solutions in single precision to 1e-7 of a step's motion, which is about 1 mm.
+        # Stamps round to nanoseconds. Solutions in single precision round to 1e-7 of a step's motion of about 1 mm.
         rounding = 80 * 1e-7 * 1e-3
         for k in range(1, 81):
             self.assertLess(distance(played[("flap", k)], frames[("flap", k)]), rounding, k)

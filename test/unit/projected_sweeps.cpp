@@ -149,7 +149,7 @@ TEST(AverageProjection, MovesPointsByTheLeast)
     projection.addForces(-1.0, mu, forces);
     EXPECT_LT((give.transpose() * matrixOf(forces).transpose()).norm(),
               1e-10 * (give.transpose() * matrixOf(sheet.load()).transpose()).norm());
-    // one that is left out has no force, and all others are exact
+    // An average that is left out has no force, and all others are exact.
     mu.assign(mu.size(), 1.0);
     projection.leaveOut({1, 4});
     projection.solve(mu);
@@ -198,7 +198,7 @@ void expectSolution(AveragedSheet& sheet, AverageProjection& projection, Project
 
 TEST(ProjectedSweeps, SolveTheSaddlePointSystem)
 {
-  // many averages, and so few that groups of points move as a whole
+  // The first sheet has many averages, the second so few that groups of points move as a whole.
   for (const auto& [cells, levels] : {std::pair(12, 1), std::pair(1, 4)})
   {
     AveragedSheet sheet(cells, levels);

@@ -28,11 +28,11 @@ struct ClothEnergies
   double total() const { return membrane + bending + kinetic + gravity; }
 };
 
-/// Of the linear equations (measured: study implicit_step).
+/// Says how linear equations are solved. The study implicit_step compares both ways.
 enum class ClothSolver
 {
-  cholesky,      ///< factorisation of the whole matrix; no prescribed averages
-  gauss_seidel   ///< conjugate gradients preconditioned by symmetric Gauss-Seidel sweeps
+  cholesky,      ///< The whole matrix is factored. Prescribed averages are refused.
+  gauss_seidel   ///< Symmetric Gauss-Seidel sweeps precondition conjugate gradients.
 };
 
 /// Says how the equations of a cloth are solved.

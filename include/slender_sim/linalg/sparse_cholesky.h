@@ -33,7 +33,7 @@ public:
   /// nested dissection of the graph of points (METIS), with the unknowns of a point next to each other and supernodes
   /// wider than CHOLMOD's; factoring and solving take no memory. values() is then not to be used.
   void setPattern(const BlockMatrix& matrix);
-  void setPattern(const PointMatrix& matrix, int multipliers = 0);
+  void setPattern(const PointMatrix& matrix);
   /// As factor(), of a matrix with that pattern. Points with fixed[i] != 0 keep their place: their rows and columns are
   /// those of the identity.
   bool factor(const BlockMatrix& matrix, const char* fixed);
@@ -42,7 +42,7 @@ public:
   bool factor(const PointMatrix& matrix, const double* values, const char* fixed);
   /// x = A^-1 b for points (4 doubles each; x may be b). Fixed points: x = b.
   void solvePoints(const double* b, double* x) const;
-  /// The two halves of solvePoints of a PointMatrix without multipliers: y = L^-1 b, with y in the order of elimination
+  /// The two halves of solvePoints of a PointMatrix: y = L^-1 b, with y in the order of elimination
   /// and not b, and x = L^-T y, which overwrites y.
   void forwardPoints(const double* b, double* y) const;
   void backwardPoints(double* y, double* x) const;
@@ -61,7 +61,7 @@ public:
   double pivot(int unknown) const;
 
 private:
-  void setPointPattern(const BlockMatrix& pattern, int unknowns, int multipliers);
+  void setPointPattern(const BlockMatrix& pattern, int unknowns);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;
