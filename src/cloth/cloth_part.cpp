@@ -168,6 +168,13 @@ bool ClothPart::numberUnknowns()
   return false;
 }
 
+void ClothPart::addTriples(std::vector<double>& masses) const
+{
+  for (std::size_t i = 0; i < number_.size(); ++i)
+    if (number_[i] >= 0)
+      masses.push_back(work_.model->mass[static_cast<Eigen::Index>(i)]);
+}
+
 void ClothPart::moveAlong(double alpha)
 {
   PointVector& x = work_.x;

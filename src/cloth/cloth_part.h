@@ -77,7 +77,7 @@ private:
   // ---- as Part
   AverageConstraints* averages() override { return averages_; }
   void meetAverages() override;
-  void addTriples(std::vector<char>& turns) const override { turns.insert(turns.end(), unknowns_ / 3, 0); }
+  void addTriples(std::vector<double>& masses) const override;
   bool numberUnknowns() override;
   int unknowns() const override { return unknowns_; }
   void moveAlong(double alpha) override;

@@ -198,7 +198,7 @@ private:
   bool exact_ = false;
   HessianShift shift_;   ///< of the last evaluation with a Hessian
   int linear_iterations_ = 0;
-  std::vector<char> turns_of_triples_;    ///< result of Part::addTriples() for the coupled parts
+  std::vector<double> masses_;            ///< result of Part::addTriples() for the coupled parts
   std::vector<Key> keys_, keys_before_;   ///< room for contacts that the pattern has, sorted
   std::vector<Key> new_keys_;             ///< of present contacts that are not in keys_
   std::vector<Key> merged_keys_;

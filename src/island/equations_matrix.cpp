@@ -271,7 +271,7 @@ void Equations::buildPattern()
     columnsOf(term, rows);
     matrix_.noteRows(rows.data(), 3);
   }
-  matrix_.finish(chooseSolver(), turns_of_triples_);
+  matrix_.finish(chooseSolver(), masses_);
   if (matrix_.solver() == SharedMatrix::Solver::sweeps)
     unsettle();   // Sweeps cannot leave unknowns out.
   keys_valid_ = true;
@@ -283,10 +283,8 @@ void Equations::buildPattern()
 
 SharedMatrix::Solver Equations::chooseSolver()
 {
-  // Sweeps solve for no multipliers.
-  return solver == IslandSolver::automatic && multipliers_ == matrix_.unknowns() && sweepsPay()
-             ? SharedMatrix::Solver::sweeps
-             : SharedMatrix::Solver::cholesky;
+  return solver == IslandSolver::automatic && sweepsPay() ? SharedMatrix::Solver::sweeps
+                                                          : SharedMatrix::Solver::cholesky;
 }
 
 /// Returns whether sweeps over points are the fastest solver. They are faster than a factorisation for cloth of any
@@ -295,14 +293,13 @@ SharedMatrix::Solver Equations::chooseSolver()
 bool Equations::sweepsPay()
 {
   constexpr int kLeastUnknowns = 300, kTriplesPerBody = 30;
-  turns_of_triples_.clear();
+  masses_.clear();
   for (const Part* part : parts_)
     if (part->coupled)
-      part->addTriples(turns_of_triples_);
-  const auto triples = static_cast<int>(turns_of_triples_.size());
-  const auto bodies = static_cast<int>(std::count(turns_of_triples_.begin(), turns_of_triples_.end(), 1));
-  return 3 * triples == matrix_.unknowns() && matrix_.unknowns() >= kLeastUnknowns &&
-         triples >= kTriplesPerBody * bodies;
+      part->addTriples(masses_);
+  const auto triples = static_cast<int>(masses_.size());
+  const auto bodies = static_cast<int>(std::count(masses_.begin(), masses_.end(), 0.0));
+  return 3 * triples == multipliers_ && multipliers_ >= kLeastUnknowns && triples >= kTriplesPerBody * bodies;
 }
 
 // ---- the matrix

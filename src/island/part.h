@@ -99,9 +99,9 @@ public:
   /// Numbers the unknowns that are not prescribed. Returns false if the numbers differ from those of the last call.
   virtual bool numberUnknowns() = 0;
   virtual int unknowns() const = 0;   ///< how many are not prescribed
-  /// Appends one entry for each three consecutive unknowns: 0 if they are the coordinates of a point, 1 if they are a
-  /// rotation vector. A part whose unknowns do not come in threes appends nothing.
-  virtual void addTriples(std::vector<char>&) const {}
+  /// Appends one entry for each three consecutive unknowns: the mass [kg] if they are the coordinates of a point, 0 if
+  /// they are a rotation vector. A part whose unknowns do not come in threes appends nothing.
+  virtual void addTriples(std::vector<double>&) const {}
   /// Whether joints connect the part to other parts. Then it is coupled whatever it touches.
   virtual bool joined() const { return false; }
 

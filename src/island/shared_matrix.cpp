@@ -119,7 +119,7 @@ void SharedMatrix::noteBlocks()
   }
 }
 
-void SharedMatrix::finish(Solver solver, const std::vector<char>& turns)
+void SharedMatrix::finish(Solver solver, const std::vector<double>& masses)
 {
   solver_ = solver;
   cholesky_known_ = false;
@@ -139,7 +139,7 @@ void SharedMatrix::finish(Solver solver, const std::vector<char>& turns)
     return;
   if (!sweeps_)
     sweeps_ = std::make_unique<PointSweeps>();
-  sweeps_->setPattern(starts_, rows_, turns);
+  sweeps_->setPattern(starts_, rows_, masses);
 }
 
 int SharedMatrix::index(int a, int b) const

@@ -77,8 +77,8 @@ public:
   /// What has been noted so far remains noted when beginAgain() begins the next pattern of the same unknowns.
   void keepNoted();
   void beginAgain();
-  /// `turns`: see PointSweeps; only `sweeps` needs it.
-  void finish(Solver solver = Solver::cholesky, const std::vector<char>& turns = {});
+  /// `masses`: see PointSweeps; only `sweeps` needs them.
+  void finish(Solver solver = Solver::cholesky, const std::vector<double>& masses = {});
   int unknowns() const { return unknowns_; }
   Solver solver() const { return solver_; }
   /// Where an entry of the pattern lies among values().

@@ -66,9 +66,9 @@ void ProjectedSweeps::setRows(Search<Scalar>& s)
   s.averages.assign(4 * static_cast<std::size_t>(c.rows()), Scalar(0));
 }
 
-bool ProjectedSweeps::set(double factor, const std::vector<char>& held)
+bool ProjectedSweeps::set(double factor, const std::vector<char>& held, const std::vector<char>* apart)
 {
-  blocks_.set(factor, held, nullptr);
+  blocks_.set(factor, held, apart);
   single_.packed = double_.packed = false;
   if (!grouped_)
     return true;

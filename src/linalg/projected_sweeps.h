@@ -21,9 +21,8 @@ public:
   void setPattern(const BlockMatrix& a, const PointMatrix* b);
   /// Takes the averages and the free points after prepare(). The projection must outlive its use.
   void setAverages(const AverageProjection& projection);
-  /// The values of A as they are now. Right-hand sides and solutions are zero at held points, which must stay where
-  /// they are. Returns false if the matrix is not positive definite on groups of points.
-  bool set(double factor, const std::vector<char>& held);
+  /// As SymmetricSweeps::set(). Returns false if the matrix is not positive definite on groups of points.
+  bool set(double factor, const std::vector<char>& held, const std::vector<char>* apart = nullptr);
   /// Of a load as if there were no averages: sqrt(r . P r), where P is a sweep alone. Negative or not a number where
   /// the matrix is not definite.
   double norm(const PointVector& r);
@@ -87,7 +86,7 @@ private:
   SweptBlocks blocks_;   ///< Points are numbered as it visits them.
   Deflation deflation_;
   const AverageProjection* projection_ = nullptr;
-  bool grouped_ = false;   ///< groups move as a whole
+  bool grouped_ = false;   ///< Groups move as a whole.
   Search<float> single_;
   Search<double> double_;
   PointVector right_, residual_, product_;   ///< in the order of A

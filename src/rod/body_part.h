@@ -59,7 +59,10 @@ public:
 
 private:
   // ---- as RigidPart
-  void addTriples(std::vector<char>& turns) const override { turns.insert(turns.end(), {0, 1}); }
+  void addTriples(std::vector<double>& masses) const override
+  {
+    masses.insert(masses.end(), {system.model().mass, 0.0});
+  }
   bool numberUnknowns() override { return true; }   // they never change
   int unknowns() const override { return 6; }
   bool joined() const override { return !carried_.empty(); }

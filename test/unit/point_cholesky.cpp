@@ -74,13 +74,13 @@ TEST(PointSweeps, SolveWhatDenseFactorsSolve)
         }
       starts.push_back(static_cast<int>(rows.size()));
     }
-    std::vector<char> turns(n / 3, 0);
-    turns.back() = 1;
+    std::vector<double> masses(n / 3, 1.0);
+    masses.back() = 0.0;
     std::vector<double> right(n);
     for (double& b : right)
       b = random.vector()[0];
     PointSweeps sweeps;
-    sweeps.setPattern(starts, rows, turns);
+    sweeps.setPattern(starts, rows, masses);
     const LinearResult result = sweeps.solve(values, right, tolerance, 500);
     sweeps.copySolution(x.data());
     x = matrix * x - Eigen::Map<const VectorXd>(right.data(), n);   // what is left
@@ -98,6 +98,59 @@ TEST(PointSweeps, SolveWhatDenseFactorsSolve)
   EXPECT_LT(sum.norm(), 1e-10);
   A(cloth + 3, cloth + 3) = -1.0;
   EXPECT_FALSE(solve(A, 1e-10, left).definite);
+}
+
+/// The matrix of an island whose cloth has averages, with their multipliers. Both the solution and the multipliers are
+/// those of a dense factorisation.
+TEST(PointSweeps, SolveForMultipliersOfAverages)
+{
+  System s;
+  constexpr int kAverages = 5;
+  const int cloth = 3 * s.points(), body = cloth + 6, n = body + 3 * kAverages;
+  MatrixXd A = MatrixXd::Zero(n, n);
+  A.topLeftCorner(cloth, cloth) = denseOf(s.blocks);
+  A.block<6, 6>(cloth, cloth).diagonal() << 4, 4, 4, 0.1, 0.2, 0.3;
+  A(cloth + 4, 30) = A(30, cloth + 4) = 0.05;   // A contact of the body couples its turn to a vertex.
+  for (int i = 0; i < kAverages; ++i)
+    for (int k = 0; k < 6; ++k)
+      for (int c = 0; c < 3; ++c)
+      {
+        const int row = body + 3 * i + c, column = 3 * ((9 * i + 2 * k) % s.points()) + c;
+        A(row, column) = A(column, row) = 0.1 + 0.03 * k + 0.01 * i;
+      }
+  std::vector<int> starts{0}, rows;
+  std::vector<double> values, masses(body / 3, 0.5), right(n, 0.0);
+  masses.back() = 0.0;
+  for (int j = 0; j < n; ++j)
+  {
+    for (int i = j; i < n; ++i)
+      if (A(i, j) != 0.0 || i == j)
+      {
+        rows.push_back(i);
+        values.push_back(A(i, j));
+      }
+    starts.push_back(static_cast<int>(rows.size()));
+  }
+  Random random(7);
+  for (int i = 0; i < body; ++i)
+    right[i] = random.vector()[0];
+  const VectorXd expected = A.fullPivLu().solve(Eigen::Map<const VectorXd>(right.data(), n));
+  PointSweeps sweeps;
+  sweeps.setPattern(starts, rows, masses);
+  VectorXd x(n);
+  for (const double stiffer : {1.0, 2.0})   // The next matrix of the same pattern has the same averages.
+  {
+    std::vector<double> scaled = values;
+    for (int j = 0; j < body; ++j)
+      for (int k = starts[j]; k < starts[j + 1] && rows[k] < body; ++k)
+        scaled[k] *= stiffer;
+    const LinearResult result = sweeps.solve(scaled, right, 1e-12, 500);
+    EXPECT_TRUE(result.definite);
+    EXPECT_LE(result.residual, 1e-12);
+    sweeps.copySolution(x.data());
+    EXPECT_LT((stiffer * x - expected).head(body).norm(), 1e-9 * expected.head(body).norm());
+    EXPECT_LT((x - expected).tail(n - body).norm(), 1e-8 * expected.tail(n - body).norm());
+  }
 }
 
 TEST(SymmetricSweeps, SolveWithAndWithoutAMatrixOfPoints)
