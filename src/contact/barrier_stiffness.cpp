@@ -1,91 +1,121 @@
 #include "barrier_stiffness.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace slender {
 
 namespace {
 
-constexpr double kLeastGap = 12.0;   // the gap over the smallest that barriers are to be resolved in
+constexpr double kLeastGap = 12.0;     // the gap over the smallest that barriers are to be resolved in
+constexpr double kLeastShare = 0.01;   // of the gap, where layers begin: thinner ones would be hard to solve
 
 }   // namespace
 
-void BarrierStiffness::set(double force, const BarrierRange& range)
+void BarrierStiffness::set(const BarrierLaw& law, const BarrierRange& range)
 {
   range_ = range;
-  value_ = force;
+  law_ = law;
+  is_new_ = law_.layers[0].stiffness == 0.0;
   bound();
 }
 
 /// The stiffness stays finite if loads overflow. The step then fails with a reason that names the part.
 void BarrierStiffness::bound()
 {
-  value_ = std::min(std::max(value_, range_.least), std::min(range_.most, std::numeric_limits<double>::max()));
+  const double most = std::min(range_.most, std::numeric_limits<double>::max());
+  law_.layers[0].stiffness = std::max(law_.layers[0].stiffness, range_.least);
+  for (BarrierLayer& layer : law_.layers)
+    layer.stiffness = std::min(layer.stiffness, most);
 }
 
 void BarrierStiffness::restart()
 {
-  largest_force_ = largest_load_ = 0.0;
+  largest_force_ = 0.0;
   share_ = std::numeric_limits<double>::infinity();
 }
 
 void BarrierStiffness::take(double force, double stiffness, double share)
 {
   largest_force_ = std::max(largest_force_, force);
-  largest_load_ = std::max(largest_load_, force / stiffness);
   if (share >= share_)
     return;
   share_ = share;
   stiffness_there_ = stiffness;
 }
 
-void BarrierStiffness::beginStep()
+bool BarrierStiffness::beginStep()
 {
   share_begin_ = share_;
   stiffened_ = narrow_ = false;
+  const bool begins_inside = is_new_ && share_ < 1.0;
+  if (begins_inside)
+    law_.layers[0].share = std::max(share_, kLeastShare);
+  is_new_ = false;
+  return begins_inside;
 }
 
+/// A layer that nothing is in goes. The outermost one grows up to the nearest surface, and becomes softer while loads
+/// are small: slowly, because a load that comes back should find no soft barrier. Under a load that stays, it slowly
+/// becomes as stiff as the load needs, so that inner layers, which are harder to solve, are not needed for long.
 void BarrierStiffness::adapt(const Barrier& barrier)
 {
-  // force over stiffness at a fifth, a twelfth and half of the gap
-  const double c = barrier.force(barrier.c / 5), high = barrier.force(barrier.c / kLeastGap), low = 1.0;
-  if (largest_load_ > high && shrinks())
-    value_ = largest_force_ / c;
-  else if (largest_load_ > 0.0 && largest_load_ < low)   // slowly: a load that comes back should find no soft barrier
-    value_ = std::max(0.8 * value_, std::min(value_, largest_force_ / c));
+  constexpr double kLarge = 0.5;   // share of a layer
+  constexpr double kStill = 0.02, kGrowth = 1.2;
+  const double aim = largest_force_ / barrier.force(barrier.c / 5);
+  if (isTooSmall() && shrinks())
+    raise(share_, aim);
+  while (law_.count() > 1 && share_ >= innermost().share)
+    innermost() = {0.0, 0.0};
+  BarrierLayer& outer = law_.layers[0];
+  if (share_ >= outer.share)
+    outer.share = std::min(share_, 1.0);
+  else if (law_.count() == 1 && share_ > kLarge * outer.share)
+    outer.stiffness = std::max(0.8 * outer.stiffness, std::min(outer.stiffness, aim));
+  else if (law_.count() > 1 && std::abs(share_ - share_begin_) < kStill * share_begin_)
+    outer.stiffness = std::clamp(aim, outer.stiffness, kGrowth * outer.stiffness);
   bound();
 }
+
+bool BarrierStiffness::isTooSmall() const { return share_ * kLeastGap < law_.innermost().share; }
 
 /// Whether a gap has become smaller since the step began, or is tiny, so that a stiffer barrier may open it.
 bool BarrierStiffness::shrinks() const
 {
   constexpr double kLess = 0.9, kTiny = 0.02;
-  return !narrow_ && (share_ < kLess * share_begin_ || share_ < kTiny);
+  return !narrow_ && (share_ < kLess * share_begin_ || share_ < kTiny * law_.innermost().share);
+}
+
+/// `share`: of the smallest gap for which forces may not change.
+void BarrierStiffness::raise(double share, double stiffness)
+{
+  const int count = law_.count();
+  if (share < innermost().share && kLeastShare < innermost().share && count < BarrierLaw::kMost)
+    law_.layers[static_cast<std::size_t>(count)] = {std::max(share, kLeastShare), stiffness};
+  else
+    innermost().stiffness = stiffness;
 }
 
 bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)
 {
   constexpr double kOpened = 1.1;
-  if (share_ > 1.0 / kLeastGap || narrow_)
+  if (!isTooSmall() || narrow_)
     return false;
   if (stiffened_ && share_ < kOpened * share_before_)
   {
     narrow_ = true;
-    value_ = value_before_;
+    law_ = law_before_;
     return true;
   }
   if (!stiffened_ && !shrinks())
     return false;
-  const double before = value_;
-  if (converged)
-    adapt(barrier);
-  else   // Where a gap has collapsed, the forces are far too large to follow them.
-    value_ =
-        std::clamp(largest_force_ / barrier.force(barrier.c / 5), 4.0 * stiffness_there_, 100.0 * stiffness_there_);
+  const double aim = largest_force_ / barrier.force(barrier.c / 5);
+  law_before_ = law_;
+  // Where a gap has collapsed, the forces are far too large to follow them.
+  raise(share_begin_, converged ? aim : std::clamp(aim, 4.0 * stiffness_there_, 100.0 * stiffness_there_));
   bound();
-  value_before_ = before;
   stiffened_ = true;
-  return value_ > before;
+  return !(law_ == law_before_);
 }
 
 }   // namespace slender

@@ -7,40 +7,48 @@
 
 namespace slender {
 
-/// The stiffness of the barrier about one object [N], which follows the forces on this object. What touches other
-/// objects of the island does not change it.
+/// The barrier about one object, which follows the forces on this object. What touches other objects of the island does
+/// not change it.
+///
+/// A barrier never becomes stiffer where a gap is already inside it, because that would be energy from nowhere.
+/// Instead, a stiffer layer is added that begins at the smallest gap that there is. As long as the object stays
+/// pressed, forces so remain a fixed function of gaps. Layers that nothing is in are taken away.
 class BarrierStiffness
 {
 public:
-  double value() const { return value_; }
-  /// The range holds until the next call.
-  void set(double force, const BarrierRange& range);
+  const BarrierLaw& law() const { return law_; }
+  /// The range holds until the next call. A law that was not chosen yet gets the least stiffness.
+  void set(const BarrierLaw& law, const BarrierRange& range);
 
   // ---- the contacts of an evaluation
   void restart();
-  /// A contact of the object: the normal force [N], the stiffness of its barrier [N], and the gap over the one at which
-  /// the pair repels.
+  /// A contact of the object: the normal force [N], the stiffness of its innermost layer [N], and the gap over the one
+  /// at which the pair repels.
   void take(double force, double stiffness, double share);
 
-  void beginStep();                                  ///< The last evaluation was where a step begins.
+  /// The last evaluation was where a step begins. Returns true if the law was not chosen before, and now begins at the
+  /// smallest gap. Then the evaluation has to be repeated.
+  bool beginStep();
   void beginSolution() { share_before_ = share_; }   ///< likewise
   /// See ContactPotential::adaptStiffness() and stiffen().
   void adapt(const Barrier& barrier);
   bool stiffen(const Barrier& barrier, bool converged);
 
 private:
+  BarrierLayer& innermost() { return law_.layers[static_cast<std::size_t>(law_.count() - 1)]; }
+  bool isTooSmall() const;
   bool shrinks() const;
+  void raise(double share, double stiffness);
   void bound();
 
-  double value_ = 0.0;
+  BarrierLaw law_, law_before_;   ///< law_before_: before the barrier was made stiffer
   BarrierRange range_;
   double largest_force_ = 0.0;                                      ///< of the last evaluation [N]
-  double largest_load_ = 0.0;                                       ///< force over the stiffness of its barrier
   double share_ = std::numeric_limits<double>::infinity();          ///< smallest gap over that which repels
-  double stiffness_there_ = 0.0;                                    ///< of the barrier of this smallest gap
+  double stiffness_there_ = 0.0;                                    ///< of the innermost layer of this smallest gap
   double share_begin_ = std::numeric_limits<double>::infinity();    ///< share_ at beginStep()
   double share_before_ = std::numeric_limits<double>::infinity();   ///< share_ at beginSolution()
-  double value_before_ = 0.0;                                       ///< stiffness before the barrier was made stiffer
+  bool is_new_ = true;                                              ///< The law was not chosen before this step.
   bool stiffened_ = false;                                          ///< The barrier was made stiffer in this step.
   bool narrow_ = false;   ///< In this step a stiffer barrier has opened no gap.
 };

@@ -115,15 +115,20 @@ double ContactPotential::limitOf(const SurfaceMotion& m, const SheetCandidates::
   return faceSolidLimit(corner, on.face.corners, solids_[on.solid].pieces[on.piece], rigid_[on.solid], limit);
 }
 
+void ContactPotential::setRigid(const SurfaceMotion& motion)
+{
+  rigid_.clear();
+  for (std::size_t k = 0; k < motion.solids.size(); ++k)
+    rigid_.emplace_back(motion.solids[k], motion.solids_end[k]);
+}
+
 /// Calls take(meeting, limit) for each pair that may not go the whole motion, if wanted(meeting) is true.
 template <class Wanted, class Take>
 void ContactPotential::forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take)
 {
   constexpr int kChunk = 256;
   const Candidates& candidates = candidatesOf(motion);
-  rigid_.clear();
-  for (std::size_t k = 0; k < motion.solids.size(); ++k)
-    rigid_.emplace_back(motion.solids[k], motion.solids_end[k]);
+  setRigid(motion);
   limits_.resize(static_cast<std::size_t>(count(candidates)));
   parallelFor(count(candidates) <= kChunk ? 1 : threads_, count(candidates), kChunk, [&](int k) {
     visit(candidates, k,

@@ -1,4 +1,4 @@
-// Finds what may have passed through a cloth or a curve although no iterate of a solution touched it.
+// Finds what may have passed through a cloth, a curve or a solid although no iterate of a solution touched it.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,54 +19,83 @@ void ContactPotential::takeDisplacements(const Eigen::Matrix3Xd& x_end)
   for (const ContactSegment& s : surface_.segments)
     include(s.object, s.a, s.b);
   for (const ContactTriangle& t : surface_.triangles)
-  {
     for (int k = 0; k < 3; ++k)
       include(t.object, t.corner[k], t.corner[(k + 1) % 3]);
-    displacements_[t.object].has_triangles = true;
-  }
 }
 
-/// Returns whether anything has moved against a cloth or a curve by more than half of the shortest edge there since
-/// begin(). What moves less cannot get to the other side without coming near the rim or the end.
-bool ContactPotential::movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
+/// How deep [m] what moves straight may get into a solid before it counts as having passed through: half of the radius
+/// of the largest ball in the solid or in the body that the object belongs to, whichever is smaller. What slides around
+/// a solid, or rolls over it, gets less deep on straight ways, unless its step is long. Infinite where nothing counts.
+double ContactPotential::depthOfPassing(int object, int solid) const
+{
+  const int carrier = surface_.objects[object].carrier;
+  const ConvexPiece& piece = solids_[solid].pieces.front();
+  if (carrier == solid || std::holds_alternative<Plane>(piece))
+    return kInfinity;
+  return 0.5 * std::min(innerRadius(piece), carrier >= 0 ? innerRadius(solids_[carrier].pieces.front()) : kInfinity);
+}
+
+/// Whether a piece of an object crosses the core of a solid. The triangles of a mesh have no core: a piece may get into
+/// them as deep as it is thick.
+bool ContactPotential::crossesCore(const SurfaceMotion& motion, const int* corner, int corners, int object, int solid,
+                                   int piece, double radius) const
+{
+  const double depth = depthOfPassing(object, solid);
+  const ConvexPiece& whole = solids_[solid].pieces[piece];
+  const bool hollow = std::holds_alternative<Triangle>(whole);
+  ApproachLimit limit;
+  limit.thickness = hollow ? radius - depth : radius;
+  limit.reach = 1e-3 * options_.gap;
+  if (!std::isfinite(depth) || !(limit.thickness > 0.0))
+    return false;
+  MovingPoint moving[3];
+  for (int k = 0; k < corners; ++k)
+    moving[k] = motion.of(corner[k]);
+  const double share =
+      faceSolidLimit(moving, corners, hollow ? whole : withoutLayer(whole, depth), rigid_[solid], limit);
+  return share > 0.0 && share < 1.0;   // 0: the piece is there at the start.
+}
+
+/// Returns whether anything has moved so far since begin() that passedThrough() has to examine it. What moves less
+/// cannot get to the other side without coming near the rim, the end, or the surface.
+bool ContactPotential::movedFar(const Eigen::Matrix3Xd& x_end)
 {
   constexpr double kFar = 0.5;   // of the shortest edge
   takeDisplacements(x_end);
-  const auto far = [&](const Displacements& object, const BoundingBox& other) {
-    const Eigen::Vector3d most =
-        (object.box.high - other.low).cwiseAbs().cwiseMax((other.high - object.box.low).cwiseAbs());
-    return most.norm() > kFar * object.shortest_edge;
+  const auto way = [](const BoundingBox& a, const BoundingBox& b) {
+    return (a.high - b.low).cwiseAbs().cwiseMax((b.high - a.low).cwiseAbs()).norm();
   };
-  for (std::size_t i = 0; i < displacements_.size(); ++i)
+  const int objects = static_cast<int>(displacements_.size()), solids = static_cast<int>(rigid_.size());
+  const auto isEmpty = [](const BoundingBox& box) { return box.low.x() > box.high.x(); };
+  for (int i = 0; i < objects; ++i)
   {
     const Displacements& object = displacements_[i];
-    if (!std::isfinite(object.shortest_edge) || !surface_.objects[i].others)
-      continue;
-    for (std::size_t k = 0; k < displacements_.size(); ++k)
-      if (const BoundingBox& other = displacements_[k].box;
-          k != i && surface_.objects[k].others && other.low.x() <= other.high.x() && far(object, other))
+    for (int k = 0; k < solids && !isEmpty(object.box); ++k)
+      if (const double depth = depthOfPassing(i, k);
+          std::isfinite(depth) &&
+          way(object.box, {rigid_[k].shift, rigid_[k].shift}) + rigid_[k].turn.norm() * solids_[k].reach > depth)
         return true;
-    for (std::size_t k = 0; k < solids_end.size() && object.has_triangles; ++k)
-    {
-      const Eigen::Vector3d way = solids_end[k].position - solids_begin_[k].position;
-      if (far(object, {way, way}))
+    for (int k = 0; k < objects && surface_.objects[i].others; ++k)
+      if (const BoundingBox& other = displacements_[k].box; k != i && surface_.objects[k].others && !isEmpty(other) &&
+                                                            way(object.box, other) > kFar * object.shortest_edge)
         return true;
-    }
   }
   return false;
 }
 
 bool ContactPotential::passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end)
 {
-  if (!movedFar(x_end, solids_end))
+  const SurfaceMotion whole{x_begin_, x_end, solids_begin_, solids_end};
+  setRigid(whole);
+  if (!movedFar(x_end))
     return false;
-  swept_.build(surface_, sheets_, solids_, {x_begin_, x_end, solids_begin_, solids_end}, rangeOfSweeps());
+  swept_.build(surface_, sheets_, solids_, whole, rangeOfSweeps());
   ApproachLimit limit;
   // Only middle surfaces and centrelines that cross count. Surfaces that slide may come nearer than their thickness on
   // straight ways.
   limit.thickness = 0.0;
   limit.reach = 1e-3 * options_.gap;
-  const auto motion = [&](int i) { return MovingPoint{x_begin_.col(i), x_end.col(i)}; };
+  const auto motion = [&](int i) { return whole.of(i); };
   const auto crosses = [](double share) { return share > 0.0 && share < 1.0; };   // 0: they cross at the start
   for (const GridPairs::Pair& pair : swept_.pairs())
   {
@@ -89,15 +118,17 @@ bool ContactPotential::passedThrough(const Eigen::Matrix3Xd& x_end, const std::v
                                                            motion(t.corner[2]), limit)))
       return true;
   }
-  for (const SheetCandidates::OnSolid& on : swept_.sheets().onSolids())
+  for (const Candidates::OnSolid& on : swept_.onSolids())
   {
-    if (on.face.corners != 3 || !surface_.objects[on.face.object].others || passes(on))
-      continue;
-    const MovingPoint middle{solids_begin_[on.solid].position, solids_end[on.solid].position};
-    const auto& c = on.face.corner;
-    if (crosses(pointTriangleLimit(middle, motion(c[0]), motion(c[1]), motion(c[2]), limit)))
+    const ContactSegment& s = surface_.segments[on.segment];
+    const int ends[2] = {s.a, s.b};
+    if (!passes(on) && crossesCore(whole, ends, 2, s.object, on.solid, on.piece, s.radius))
       return true;
   }
+  for (const SheetCandidates::OnSolid& on : swept_.sheets().onSolids())
+    if (!passes(on) &&
+        crossesCore(whole, on.face.corner.data(), on.face.corners, on.face.object, on.solid, on.piece, on.face.radius))
+      return true;
   return false;
 }
 

@@ -75,7 +75,7 @@ ContactPotential::ContactPotential(ContactSurface s, const ContactOptions& o)
   held_.build(surface_);
   listSegments();
   for (BarrierStiffness& own : stiffness_)
-    own.set(0.0, {options_.least_stiffness, kInfinity});
+    own.set({}, {options_.least_stiffness, kInfinity});
   solids_.resize(surface_.solids.size());
   for (std::size_t k = 0; k < solids_.size(); ++k)
   {
@@ -270,11 +270,23 @@ bool ContactPotential::addContact(const Place& place, const PairGap& gap, Contac
 {
   if (!(gap.gap > 0.0))
     return false;
-  const double g = gap.gap / scale;
-  if (g >= options_.gap)
+  if (gap.gap / scale >= options_.gap)
     return true;
-  const double pair_stiffness = stiffnessOf(contact), force = pair_stiffness * barrier_.force(g),
-               energy = pair_stiffness * barrier_.energy(g) * scale;
+  const PairBarrier pair = barrierOf(contact);
+  double force = 0.0, energy = 0.0, curvature = 0.0, innermost = 0.0;
+  for (int k = 0; k < pair.count; ++k)
+  {
+    const BarrierLayer& layer = pair.layers[static_cast<std::size_t>(k)];
+    const double range = scale * layer.share, g = gap.gap / range;
+    if (g >= options_.gap)
+      continue;
+    force += layer.stiffness * barrier_.force(g);
+    energy += layer.stiffness * barrier_.energy(g) * range;
+    curvature += layer.stiffness * barrier_.stiffness(g) / range;
+    innermost = std::max(innermost, layer.stiffness);
+  }
+  if (innermost == 0.0)
+    return true;
   if (!std::isfinite(energy))
     return false;
   copyFour(contact.weight, gap.place);
@@ -285,22 +297,34 @@ bool ContactPotential::addContact(const Place& place, const PairGap& gap, Contac
   if (place.with_stiffness)
   {
     const Eigen::Matrix3d normals = gap.normal * gap.normal.transpose();
-    const double stiffness = pair_stiffness * barrier_.stiffness(g) / scale * gap.weight * gap.weight;
+    const double stiffness = curvature * gap.weight * gap.weight;
     term.stiffness = stiffness * normals;
     if (contact.solid < 0)
       term.geometric = -force * gap.weight / gap.distance * (Eigen::Matrix3d::Identity() - normals);
     addMotion(gap, contact, force, out);
   }
   out.contacts.push_back(contact);
-  out.measures.push_back({energy, gap.gap, g / options_.gap, force * gap.weight, pair_stiffness});
+  out.measures.push_back({energy, gap.gap, gap.gap / scale / options_.gap, force * gap.weight, innermost});
   return true;
 }
 
-double ContactPotential::stiffnessOf(const Contact& contact) const
+void ContactPotential::PairBarrier::add(const BarrierLaw& law)
 {
-  return std::max(stiffness_[contact.object].value(), contact.solid >= 0
-                                                          ? surface_.solids[contact.solid].least_stiffness
-                                                          : stiffness_[contact.other].value());
+  layers[0].share = std::max(layers[0].share, law.layers[0].share);
+  layers[0].stiffness = std::max(layers[0].stiffness, law.layers[0].stiffness);
+  for (int k = 1; k < law.count(); ++k)
+    layers[static_cast<std::size_t>(count++)] = law.layers[static_cast<std::size_t>(k)];
+}
+
+ContactPotential::PairBarrier ContactPotential::barrierOf(const Contact& contact) const
+{
+  PairBarrier pair;
+  pair.add(stiffness_[contact.object].law());
+  if (contact.solid >= 0)
+    pair.layers[0].stiffness = std::max(pair.layers[0].stiffness, surface_.solids[contact.solid].least_stiffness);
+  else if (contact.other != contact.object)
+    pair.add(stiffness_[contact.other].law());
+  return pair;
 }
 
 ContactTerm& ContactPotential::addTerm(const Contact& contact, Batch& out)
@@ -350,8 +374,11 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   solids_begin_ = solids;
   h_ = h;
   evaluate(x, solids, false, nullptr);
+  bool changed = false;
   for (BarrierStiffness& own : stiffness_)
-    own.beginStep();
+    changed = own.beginStep() || changed;
+  if (changed)
+    evaluate(x, solids, false, nullptr);
   lagFriction();
   beginFollowing();   // The first friction replaces none, so that its change does not count as alternation.
 }
@@ -371,19 +398,20 @@ void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vec
   }
 }
 
-void ContactPotential::setStiffness(int object, double force, const BarrierRange& range)
+void ContactPotential::setBarrier(int object, const BarrierLaw& barrier, const BarrierRange& range)
 {
-  if (!(force >= 0.0) || !std::isfinite(force))
-    throw std::invalid_argument("contact: stiffness is " + std::to_string(force) +
-                                " N; must be finite and not negative");
+  for (const BarrierLayer& layer : barrier.layers)
+    if (!(layer.stiffness >= 0.0) || !std::isfinite(layer.stiffness))
+      throw std::invalid_argument("contact: stiffness is " + std::to_string(layer.stiffness) +
+                                  " N; must be finite and not negative");
   stiffness_[object].set(
-      force, {std::max(range.least, options_.least_stiffness), std::max(range.most, options_.least_stiffness)});
+      barrier, {std::max(range.least, options_.least_stiffness), std::max(range.most, options_.least_stiffness)});
 }
 
 void ContactPotential::setStiffness(double force)
 {
   for (std::size_t object = 0; object < stiffness_.size(); ++object)
-    setStiffness(static_cast<int>(object), force);
+    setBarrier(static_cast<int>(object), {{{{1.0, force}, {}, {}}}});
 }
 
 void ContactPotential::adaptStiffness()

@@ -117,10 +117,11 @@ public:
   /// depend on each other have been united. Sets the shares, and unites those that would meet.
   void limitShares(const SurfaceMotion& motion, MotionShares& shares);
 
-  /// Returns whether anything would have crossed a cloth, or a curve another curve, if points and the origins of solids
-  /// had moved straight from begin() to their present places. In one long step the iterates of a solution can go around
-  /// the rim of a cloth, or the end of a curve, without touching it. Things that moved less than half of the shortest
-  /// edge of the cloth or curve against it are not examined.
+  /// Returns whether anything would have crossed a cloth, a curve another curve, or anything the core of a solid, if
+  /// points and solids had moved straight from begin() to their present places. In one long step the iterates of a
+  /// solution can go around the rim of a cloth, the end of a curve, or a thin solid, without touching it. The core is
+  /// what lies deeper than depthOfPassing(). Things that moved less than this depth against a solid, or than half of
+  /// the shortest edge against a cloth or curve, are not examined.
   bool passedThrough(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
 
   /// Returns the potential [J] at a configuration, plus the constant of followFriction(). It is infinite where surfaces
@@ -141,20 +142,23 @@ public:
   /// Smallest softened gap of the last evaluate() [m]; infinity without contact.
   double smallestGap() const { return smallest_gap_; }
 
-  /// Force [N] of the barrier about an object at half the gap. The barrier between two objects has the larger stiffness
-  /// of the two, and that between an object and a solid is no softer than ContactSolid::least_stiffness.
+  /// The barrier about an object, part of a simulation's state. Between two objects, the outermost layer has the larger
+  /// share and the larger stiffness of the two, and the inner layers of both act. Between an object and a solid, the
+  /// outermost layer is no softer than ContactSolid::least_stiffness. A barrier that was not chosen yet begins at the
+  /// smallest gap of the object in begin(), so that nothing is thrown from where it stands.
   /// adaptStiffness(), after a step, follows the largest normal force on each object in the last evaluate(): it aims at
-  /// a smallest gap of a fifth and acts outside a twelfth to a half. It makes the barrier stiffer only where stiffen()
-  /// would. Part of a simulation's state.
-  double stiffness(int object) const { return stiffness_[object].value(); }
-  /// Sets the stiffness about an object to `force` [N], or to the nearest value in the range. The range holds until the
-  /// next call, and its least value is at least ContactOptions::least_stiffness.
-  void setStiffness(int object, double force, const BarrierRange& range = {});
-  void setStiffness(double force);   ///< of all objects
+  /// a smallest gap of a fifth and acts outside a twelfth to a half of the innermost layer. It makes the barrier
+  /// stiffer only where stiffen() would.
+  const BarrierLaw& barrier(int object) const { return stiffness_[object].law(); }
+  /// The stiffness of the outermost layer is bounded by the range, which holds until the next call, and whose least
+  /// value is at least ContactOptions::least_stiffness.
+  void setBarrier(int object, const BarrierLaw& barrier, const BarrierRange& range = {});
+  void setStiffness(double force);   ///< of barriers of one layer about all objects [N]
   void adaptStiffness();
   /// Makes the barrier stiffer about objects whose smallest gap is too small to be resolved: it is below a twelfth of
-  /// options().gap and has shrunk since begin(), or it is below a fiftieth. If the last solution has `converged`, the
-  /// stiffness becomes what adaptStiffness() chooses; otherwise it grows four- to a hundredfold. In a narrow place a
+  /// the innermost layer and has shrunk since begin(), or it is below a fiftieth. If surfaces were inside this layer at
+  /// begin(), a new layer begins at their smallest gap then. If the last solution has `converged`, the stiffness
+  /// becomes what adaptStiffness() chooses; otherwise it grows four- to a hundredfold. In a narrow place a
   /// stiffer barrier opens no gap. The next call finds this, takes the stiffness back, and the object keeps it until
   /// begin(). Returns whether a barrier has changed.
   bool stiffen(bool converged);
@@ -228,10 +232,12 @@ private:
   {
     BoundingBox box = BoundingBox::empty();
     double shortest_edge = std::numeric_limits<double>::infinity();   ///< [m]; infinite without edges
-    bool has_triangles = false;
   };
   void takeDisplacements(const Eigen::Matrix3Xd& x_end);
-  bool movedFar(const Eigen::Matrix3Xd& x_end, const std::vector<Pose>& solids_end);
+  double depthOfPassing(int object, int solid) const;
+  bool crossesCore(const SurfaceMotion& motion, const int* corner, int corners, int object, int solid, int piece,
+                   double radius) const;
+  bool movedFar(const Eigen::Matrix3Xd& x_end);
   /// Calls f for one candidate; `number` counts them in the order of their lists.
   template <class F>
   static void visit(const Candidates& candidates, int number, F&& f);
@@ -275,7 +281,14 @@ private:
     return at == ranges.end() || at->first != object ? 1.0 : at->second;
   }
   double frictionOf(const Contact& contact) const;
-  double stiffnessOf(const Contact& contact) const;
+  /// The layers that act between the objects of a contact.
+  struct PairBarrier
+  {
+    int count = 1;
+    std::array<BarrierLayer, 2 * BarrierLaw::kMost - 1> layers;
+    void add(const BarrierLaw& law);
+  };
+  PairBarrier barrierOf(const Contact& contact) const;
   FrictionSpring springOf(const Contact& contact) const;
   bool turnsWithSolid(const Contact& contact) const;
   double spin(const Contact& contact, const std::vector<Pose>& poses) const;
@@ -359,6 +372,7 @@ private:
   /// Candidates in this range hold for one motion only, because no point has a margin.
   Candidates::Range rangeOfSweeps() const { return {options_.gap, 0.0, margins_, -1.0, 0.0, threads_}; }
   const Candidates& candidatesOf(const SurfaceMotion& motion);
+  void setRigid(const SurfaceMotion& motion);
   template <class Wanted, class Take>
   void forLimits(const SurfaceMotion& motion, Wanted&& wanted, Take&& take);
   using Movers = std::array<int, 3>;

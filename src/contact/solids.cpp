@@ -133,6 +133,32 @@ void checkShape(const Shape& shape)
   }
 }
 
+double innerRadius(const ConvexPiece& piece)
+{
+  if (const auto* s = std::get_if<Sphere>(&piece))
+    return s->radius;
+  if (const auto* b = std::get_if<Box>(&piece))
+    return 0.5 * b->size.minCoeff();
+  if (const auto* c = std::get_if<Cylinder>(&piece))
+    return std::min(c->radius, 0.5 * c->length);
+  if (const auto* k = std::get_if<Capsule>(&piece))
+    return k->radius;
+  return std::numeric_limits<double>::infinity();
+}
+
+ConvexPiece withoutLayer(const ConvexPiece& piece, double depth)
+{
+  if (const auto* s = std::get_if<Sphere>(&piece))
+    return Sphere{s->radius - depth};
+  if (const auto* b = std::get_if<Box>(&piece))
+    return Box{b->size.array() - 2.0 * depth};
+  if (const auto* c = std::get_if<Cylinder>(&piece))
+    return Cylinder{c->radius - depth, c->length - 2.0 * depth};
+  if (const auto* k = std::get_if<Capsule>(&piece))
+    return Capsule{k->radius - depth, k->length};
+  return piece;
+}
+
 double boundingRadius(const Shape& shape)
 {
   if (const auto* s = std::get_if<Sphere>(&shape))

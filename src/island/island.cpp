@@ -15,7 +15,7 @@ void Island::setParts(const std::vector<Part*>& parts)
   if (parts != parts_)
     versions_.clear();   // of another surface
   parts_ = parts;
-  stiffness_.resize(parts_.size());
+  barrier_.resize(parts_.size());
   surface_changes_ = std::any_of(parts_.begin(), parts_.end(), [](const Part* part) { return part->surfaceChanges(); });
   equations_.setParts(parts_);
   if (!isExplicit(time_.integrator))
@@ -73,17 +73,22 @@ void Island::setAttraction(SubstepPotential* attraction)
   equations_.setAttraction(attraction);
 }
 
-void Island::loadStiffness(double least)
+void Island::loadBarriers(double least)
 {
   for (std::size_t k = 0; k < parts_.size(); ++k)
   {
     if (object_[k] < 0)
       continue;
     BarrierRange range = parts_[k]->barrierRange(gap_);
-    if (parts_[k]->surfaceChanges())
+    BarrierLaw law = barrier_[k];
+    if (parts_[k]->surfaceChanges())   // New pieces come into being where gaps are small, which chooses no law.
+    {
       range.least = std::max(range.least, least);
+      law.layers[0].stiffness =
+          std::max(law.layers[0].stiffness, std::min(range.least, std::numeric_limits<double>::max()));
+    }
     range.most = std::max(range.least, range.most);
-    equations_.contact()->setStiffness(object_[k], stiffness_[k], range);
+    equations_.contact()->setBarrier(object_[k], law, range);
   }
 }
 
@@ -154,7 +159,7 @@ void Island::startAccelerations()
     part->takeStartAcceleration();
 }
 
-/// Surfaces, stiffness and attraction of a substep of h seconds. Returns false if centrelines meet.
+/// Surfaces, barriers and attraction of a substep of h seconds. Returns false if centrelines meet.
 bool Island::loadContact(double h)
 {
   ContactPotential* contact = equations_.contact();
@@ -169,7 +174,7 @@ bool Island::loadContact(double h)
   }
   if (attraction_)
     attraction_->begin(equations_.startPoints(), surface_, contact->nearPairs(), gap_, h);
-  loadStiffness(attraction_ ? attraction_->largestForce() : 0.0);   // not what an attempt that failed left
+  loadBarriers(attraction_ ? attraction_->largestForce() : 0.0);   // not what an attempt that failed left
   contact->setSprings(springs);
   return true;
 }
@@ -330,7 +335,7 @@ void Island::accept(const Substep& substep)
     return;
   for (std::size_t k = 0; k < parts_.size(); ++k)
     if (object_[k] >= 0)
-      stiffness_[k] = contact->stiffness(object_[k]);
+      barrier_[k] = contact->barrier(object_[k]);
   springs = contact->springs();
 }
 

@@ -41,11 +41,11 @@ public:
   StepReport step(double duration, double& first);
   /// Box of the surface of a part during the last step, see Part::surfaceBox().
   const BoundingBox& sweptBox(std::size_t part) const { return swept_[part]; }
-  /// The stiffness of the barrier about a part [N]. It belongs to the state. 0 means that none was chosen yet.
-  double stiffness(std::size_t part) const { return stiffness_[part]; }
-  void setStiffness(std::size_t part, double stiffness) { stiffness_[part] = stiffness; }
-  /// Gives contact the stiffness of all parts. It is no softer than `least` [N] about parts whose surfaces change.
-  void loadStiffness(double least);
+  /// The barrier about a part, which belongs to the state.
+  const BarrierLaw& barrier(std::size_t part) const { return barrier_[part]; }
+  void setBarrier(std::size_t part, const BarrierLaw& barrier) { barrier_[part] = barrier; }
+  /// Gives contact the barriers of all parts. They are no softer than `least` [N] about parts whose surfaces change.
+  void loadBarriers(double least);
   /// Springs of friction of what sticks, see ContactPotential::springs(); part of the state.
   std::vector<FrictionSpring> springs;
 
@@ -76,10 +76,10 @@ private:
   std::unique_ptr<FastProjection> projection_;   ///< of `inextensible_`; null: there are no such parts
   std::vector<Part*> inextensible_;              ///< parts whose lengths explicit steps keep
   SubstepPotential* attraction_ = nullptr;
-  ContactSurface surface_;          ///< of the parts, without solids
-  std::vector<long> versions_;      ///< of the parts' surfaces
-  std::vector<int> object_;         ///< of the surface, per part; -1: the part has none
-  std::vector<double> stiffness_;   ///< per part
+  ContactSurface surface_;            ///< of the parts, without solids
+  std::vector<long> versions_;        ///< of the parts' surfaces
+  std::vector<int> object_;           ///< of the surface, per part; -1: the part has none
+  std::vector<BarrierLaw> barrier_;   ///< per part
   bool surface_changes_ = false;
   StepPlan plan_;
   double duration_ = 0.0, gap_ = 0.0;

@@ -185,9 +185,8 @@ void ObjectIsland::begin(WorldState& state, const WorldInputs& inputs)
     setParts();
   if (!contact())
     return;
-  forParts([&](const WorldObject& object, std::size_t part) {
-    island_.setStiffness(part, object.contact(state).stiffness);
-  });
+  forParts(
+      [&](const WorldObject& object, std::size_t part) { island_.setBarrier(part, object.contact(state).barrier); });
   takeRanges(state);
   takeSprings(state);
   if (!threads_.empty())
@@ -339,10 +338,11 @@ void ObjectIsland::end(WorldState& state) const
   if (!contact())
     return;
   for (const WorldObject* object : objects_)
-    object->contact(state).stiffness = 0.0;
-  forParts([&](const WorldObject& object, std::size_t part) {
-    double& stiffness = object.contact(state).stiffness;
-    stiffness = std::max(stiffness, island_.stiffness(part));
+    object->contact(state).barrier = {};
+  forParts([&](const WorldObject& object, std::size_t part) {   // An object of several parts keeps the stiffest one.
+    BarrierLaw& barrier = object.contact(state).barrier;
+    if (island_.barrier(part).layers[0].stiffness > barrier.layers[0].stiffness)
+      barrier = island_.barrier(part);
   });
   giveSprings(state);
 }

@@ -108,7 +108,7 @@ void WorldStatics::loadParts()
   begin(1.0);
   Statics::loadParts();
   if (island_.contact())
-    island_.island().loadStiffness(0.0);
+    island_.island().loadBarriers(0.0);
 }
 
 void WorldStatics::takeTrial()

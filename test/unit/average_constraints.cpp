@@ -354,7 +354,9 @@ TEST(AverageConstraints, ATrackedClothRestsBesideOneThatMoves)
     ASSERT_TRUE(alone.step(lifted(alone, k)).ok) << k;
     ASSERT_TRUE(both.step(lifted(both, k)).ok) << k;
     // One island has one stiffness of the barrier.
-    ASSERT_EQ(both.state().contact.cloths[0].stiffness, both.state().contact.cloths[1].stiffness) << k;
+    ASSERT_EQ(both.state().contact.cloths[0].barrier.layers[0].stiffness,
+              both.state().contact.cloths[1].barrier.layers[0].stiffness)
+        << k;
     ASSERT_LT(both.trackingError({ObjectRef::cloth, 0}).met, 1e-10 * 0.04) << k;
   }
   EXPECT_FALSE(both.world().contacts().empty());

@@ -422,9 +422,9 @@ TEST(ContactFriction, SpringsLastFromStepToStep)
   EXPECT_NEAR(potential.springs()[0].tension.dot(side), most, 1e-9 * most);
   forceAfter(-1.5 * full);   // and back
   EXPECT_NEAR(potential.springs()[0].tension.dot(side), -0.75 * most, 1e-6 * most);
-  potential.setStiffness(2.0 * potential.stiffness(0));   // twice the normal force
+  potential.setStiffness(2.0 * potential.barrier(0).layers[0].stiffness);   // twice the normal force
   EXPECT_NEAR(forceAfter(0.0).norm(), 0.75 * most, 1e-6 * most);
-  potential.setStiffness(0.1 * potential.stiffness(0));   // a fifth of it
+  potential.setStiffness(0.1 * potential.barrier(0).layers[0].stiffness);   // a fifth of it
   EXPECT_NEAR(forceAfter(0.0).norm(), 0.2 * most, 1e-6 * most);
 
   const Pose turned{Eigen::Vector3d::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()))};
@@ -458,6 +458,7 @@ TEST(ContactFriction, NewtonFindsTheNarrowRangeInWhichAContactSticks)
   surface.solids.push_back({Plane{}, kFriction, {}});
   const std::vector<Pose> solids(1);
   ContactPotential potential(surface, gapOptions());
+  potential.setStiffness(1.0);
   potential.begin(x, solids, kStep);
   potential.evaluate(x, solids, false);
   const double most = kFriction * potential.terms()[0].force.norm(), full = gapOptions().slip_speed * kStep;

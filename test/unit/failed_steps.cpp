@@ -33,7 +33,7 @@ std::string bytesOf(const WorldState& s)
   for (const ThreadGroupState& thread : s.threads)
     bytes += stateBytes(thread);
   for (const slender::ContactMemory& memory : s.contact.threads)
-    bytes += std::to_string(memory.stiffness);
+    bytes += std::to_string(memory.barrier.layers[0].stiffness);
   for (const ClothState& cloth : s.cloths)
     bytes += stateBytes(cloth);
   if (s.rods.empty())

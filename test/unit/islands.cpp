@@ -138,7 +138,8 @@ obstacles:
     ASSERT_TRUE(alone.step(alone.defaultInputs()).ok);
     ASSERT_TRUE(beside.step(beside.defaultInputs()).ok);
   }
-  EXPECT_GT(beside.state().contact.bodies[0].stiffness, 100.0 * beside.state().contact.rods[0].stiffness);
+  EXPECT_GT(beside.state().contact.bodies[0].barrier.layers[0].stiffness,
+            100.0 * beside.state().contact.rods[0].barrier.layers[0].stiffness);
   const double apart = (beside.state().rods[0].x - alone.state().rods[0].x).cwiseAbs().maxCoeff();
   EXPECT_LT(apart, 1e-6 * 0.001);   // of the gap; tolerances of Newton's method are of the island
 }
@@ -216,7 +217,9 @@ TEST(IslandScheduler, IslandsDoNotDependOnTheNumberOfThreads)
   for (std::size_t r = 0; r < 8; ++r)
   {
     EXPECT_EQ(one.state().rods[r].x, many.state().rods[r].x) << r;
-    EXPECT_EQ(one.state().contact.rods[r].stiffness, many.state().contact.rods[r].stiffness) << r;
+    EXPECT_EQ(one.state().contact.rods[r].barrier.layers[0].stiffness,
+              many.state().contact.rods[r].barrier.layers[0].stiffness)
+        << r;
     // all islands are alike but for their place
     Eigen::Matrix3Xd from_first = one.state().rods[r].x - one.state().rods[0].x;
     from_first.row(1).array() -= 0.1 * static_cast<double>(r);

@@ -277,7 +277,7 @@ TEST(ThreadContactScene, AThreadFallsOnAnotherAndOnATrayAndARestartIsExact)
   };
   const double sag = simulation.state().threads[1].threads[0].x[20].z();
   advance(simulation, 250);
-  EXPECT_GT(simulation.state().contact.threads[0].stiffness, 0.0);
+  EXPECT_GT(simulation.state().contact.threads[0].barrier.layers[0].stiffness, 0.0);
   EXPECT_FALSE(simulation.world().contacts().empty());
   const std::string file = ::testing::TempDir() + "touching.state";
   simulation.save(file);
@@ -297,7 +297,7 @@ TEST(ThreadContactScene, AThreadFallsOnAnotherAndOnATrayAndARestartIsExact)
   for (const Eigen::Vector3d& x : simulation.state().threads[0].threads[0].x)
     EXPECT_GT(x.z(), -0.01);
   simulation.reset();
-  EXPECT_EQ(simulation.state().contact.threads[0].stiffness, 0.0);
+  EXPECT_EQ(simulation.state().contact.threads[0].barrier.layers[0].stiffness, 0.0);
 }
 
 }   // namespace

@@ -106,6 +106,24 @@ struct ContactOptions
   double least_stiffness = 1e-6;
 };
 
+/// A barrier that acts where gaps are less than a share of ContactOptions::gap.
+struct BarrierLayer
+{
+  double share = 0.0;       ///< [-]; 0: there is no such layer
+  double stiffness = 0.0;   ///< force at half of its gap [N]
+  bool operator==(const BarrierLayer& b) const { return share == b.share && stiffness == b.stiffness; }
+};
+
+/// The barrier about an object: the sum of its layers, the outermost first. Without a stiffness it is not chosen yet.
+struct BarrierLaw
+{
+  static constexpr int kMost = 3;
+  std::array<BarrierLayer, kMost> layers{{{1.0, 0.0}, {}, {}}};
+  int count() const { return layers[2].share > 0.0 ? 3 : layers[1].share > 0.0 ? 2 : 1; }
+  const BarrierLayer& innermost() const { return layers[static_cast<std::size_t>(count() - 1)]; }
+  bool operator==(const BarrierLaw& b) const { return layers == b.layers; }
+};
+
 /// The range of the stiffness of an object's barrier [N].
 struct BarrierRange
 {

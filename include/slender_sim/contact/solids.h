@@ -29,6 +29,13 @@ struct PieceDistance
 /// p: in the piece's frame [m].
 PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p);
 
+/// Radius [m] of the largest ball in a convex piece; infinite for a plane and for a triangle, which is a part of a
+/// mesh.
+double innerRadius(const ConvexPiece& piece);
+/// What remains of a convex piece without the layer of this depth [m] below its surface. The depth must be less than
+/// innerRadius(). A plane and a triangle stay as they are.
+ConvexPiece withoutLayer(const ConvexPiece& piece, double depth);
+
 /// Throws std::invalid_argument naming what is wrong with a shape: sizes that are not positive, indices out of range,
 /// no triangles.
 void checkShape(const Shape& shape);

@@ -6,6 +6,7 @@
 
 #include "slender_sim/cloth/cloth_state.h"
 #include "slender_sim/cloth/cloth_stepper.h"
+#include "slender_sim/contact/contact_surface.h"
 #include "slender_sim/rod/rigid_body.h"
 #include "slender_sim/rod/rod_state.h"
 #include "slender_sim/rod/rod_stepper.h"
@@ -59,7 +60,7 @@ struct ContactRange
 /// What contact by the barrier keeps of an object from one step to the next.
 struct ContactMemory
 {
-  double stiffness = 0.0;   ///< of the barrier [N], the same for all objects of an island; 0: not chosen yet
+  BarrierLaw barrier;
   std::vector<ContactSpring> springs;
   std::vector<ContactRange> ranges;   ///< of a body, from the start on
 };

@@ -59,9 +59,11 @@ auto fieldsOf(const RigidBodyState&)
 auto fieldsOf(const ObjectRef&) -> Members<&ObjectRef::kind, &ObjectRef::index>;
 auto fieldsOf(const ContactSpring&)
     -> Members<&ContactSpring::partner, &ContactSpring::piece, &ContactSpring::point, &ContactSpring::tension>;
+auto fieldsOf(const BarrierLayer&) -> Members<&BarrierLayer::share, &BarrierLayer::stiffness>;
+auto fieldsOf(const BarrierLaw&) -> Members<&BarrierLaw::layers>;
 auto fieldsOf(const ContactRange&) -> Members<&ContactRange::partner, &ContactRange::share>;
 auto fieldsOf(const ContactMemory&)
-    -> Members<&ContactMemory::stiffness, &ContactMemory::springs, &ContactMemory::ranges>;
+    -> Members<&ContactMemory::barrier, &ContactMemory::springs, &ContactMemory::ranges>;
 auto fieldsOf(const ContactMemories&)
     -> Members<&ContactMemories::rods, &ContactMemories::threads, &ContactMemories::bodies, &ContactMemories::cloths>;
 auto fieldsOf(const SceneState&)

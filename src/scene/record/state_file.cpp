@@ -22,7 +22,7 @@ namespace slender {
 namespace {
 
 constexpr std::uint64_t magic = 0x4554415453444f52u;   // "RODSTATE" in little-endian bytes
-constexpr std::uint64_t version = 20;
+constexpr std::uint64_t version = 21;
 constexpr std::size_t header_size = 5 * sizeof(std::uint64_t);
 
 std::string errorText(const std::string& path, const std::string& what)
