@@ -85,7 +85,7 @@ BodySystem::Vector6 BodySystem::startAcceleration(const Vector6& wrench, const M
   inertia.topLeftCorner<3, 3>() += model_.mass * Eigen::Matrix3d::Identity();
   inertia.bottomRightCorner<3, 3>() += i_world;
   Vector6 load = wrench;
-  load.tail<3>() += model_.torque - w.cross(i_world * w);
+  load.tail<3>() += model_.torque - model_.angular_damping * (i_world * w) - w.cross(i_world * w);
   Cholesky6 factor;
   factor.compute(inertia);   // a body has mass, so the matrix is positive definite
   Vector6 a = load;
@@ -126,7 +126,10 @@ void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, c
   by_momentum_ = isImplicitEuler(plan, h);
   // first trial: the motion carried on
   const double ahead = index == 0 ? stage.time * h : (stage.time - plan.stages[0].time) * h;
-  const Eigen::Vector3d w = velocity_.angular + ahead * acceleration_.angular;
+  const double c = model_.angular_damping;
+  // Damping acts by the velocity to come. With the present velocity strong damping would turn the motion round.
+  const Eigen::Vector3d w =
+      (velocity_.angular + ahead * (acceleration_.angular + c * velocity_.angular)) / (1.0 + ahead * c);
   pose.position = base_.position + ahead * velocity_.linear + 0.5 * ahead * ahead * acceleration_.linear;
   pose.orientation = (fromRotationVector(0.5 * ahead * (velocity_.angular + w)) * base_.orientation).normalized();
 
@@ -163,13 +166,16 @@ void BodySystem::moveFreely(double h)
 }
 
 /// The targets of the other methods, by the angular velocity w of the first trial. Points of the body have the
-/// acceleration w x (w x r) beside that of the rotation vector, which R^ contains.
+/// acceleration w x (w x r) beside that of the rotation vector, which R^ contains. With half of it in R~,
+/// (R - R~) / tau_v is the rate at the stage, without it the rate tau_v / 2 earlier, so that damping would be of first
+/// order.
 void BodySystem::aimAhead(const Stage& stage, const Eigen::Vector3d& w)
 {
   const Motion hat = combine(stage.q_hat);
   const Eigen::Matrix3d centripetal = skew(w) * skew(w) * pose.orientation.toRotationMatrix();
   inertia_target_ = hat.x;
   inertia_rotation_ = (fromRotationVector(hat.r) * start_).toRotationMatrix() - stage.tau_a * stage.tau_a * centripetal;
+  damping_rotation_ -= 0.5 * stage.tau_v * stage.tau_v * centripetal;
 }
 
 void BodySystem::hold(double weight, const Eigen::Vector3d& gravity)
