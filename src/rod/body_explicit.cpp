@@ -2,6 +2,7 @@
 // 4.5.3).
 #include "body_part.h"
 
+#include "free_rotation.h"
 #include "linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
 
@@ -13,12 +14,6 @@ namespace {
 Eigen::Matrix3d pointInertia(double mass, const Eigen::Vector3d& r)
 {
   return mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
-}
-
-/// Angular velocity of a body with this angular momentum.
-Eigen::Vector3d spin(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q, const Eigen::Vector3d& momentum)
-{
-  return q * (inertia.inverse() * (q.conjugate() * momentum));
 }
 
 }   // namespace
@@ -101,8 +96,8 @@ void BodyPart::damp(double h, Eigen::Vector3d& momentum)
   momentum -= k * arm * whole_.velocity.linear + own * Eigen::Vector3d(end.tail<3>());
 }
 
-/// The centre moves by symplectic Euler. The angular momentum advances in the same way. The midpoint rule finds the
-/// turn that belongs to this momentum, because it keeps the energy of a tumbling body.
+/// The centre moves by symplectic Euler. The angular momentum advances in the same way, and then the body turns as a
+/// free body with this momentum does.
 StepFailure BodyPart::predict(const Substep& substep, StepReport&)
 {
   const double h = substep.length;
@@ -115,17 +110,8 @@ StepFailure BodyPart::predict(const Substep& substep, StepReport&)
   v.linear += h / whole_.mass * force;
   if (system.model().linear_damping > 0 || system.model().angular_damping > 0)
     damp(h, momentum);
-  Eigen::Vector3d turn = h * spin(whole_.inertia, q, momentum);
-  for (int k = 0; k < 20; ++k)
-  {
-    const Eigen::Vector3d better = h * spin(whole_.inertia, fromRotationVector(0.5 * turn) * q, momentum);
-    const bool settled = (better - turn).norm() <= 1e-15;
-    turn = better;
-    if (settled)
-      break;
-  }
-  whole_.pose = {whole_.start.position + h * v.linear, (fromRotationVector(turn) * q).normalized()};
-  v.angular = spin(whole_.inertia, whole_.pose.orientation, momentum);
+  whole_.pose = {whole_.start.position + h * v.linear, rotateFreely(whole_.inertia, q, momentum, h)};
+  v.angular = angularVelocity(whole_.inertia, whole_.pose.orientation, momentum);
   return place(whole_);
 }
 

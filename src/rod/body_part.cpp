@@ -233,7 +233,15 @@ void BodyPart::solveStartAcceleration()
   start_acceleration_ = system.startAcceleration(start_wrench_, start_inertia_);
 }
 
-void BodyPart::beginStage(std::size_t stage) { system.beginStage(*plan_, stage, length_, gravity); }
+void BodyPart::beginStage(std::size_t stage)
+{
+  if (stage == 0)
+  {
+    compose();
+    system.setWhole(centre_, whole_.inertia);
+  }
+  system.beginStage(*plan_, stage, length_, gravity);
+}
 
 void BodyPart::endStage(std::size_t stage, bool last, StepReport&)
 {

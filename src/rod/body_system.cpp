@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "free_rotation.h"
 #include "linalg/cholesky6.h"
 #include "slender_sim/geometry/rotation.h"
 
@@ -29,9 +30,33 @@ void checkBody(const BodyProperties& b)
     refuse("damping must not be negative");
 }
 
+namespace {
+
+/// Of the first step of bdf2, too.
+bool isImplicitEuler(const StepPlan& plan, double h)
+{
+  return plan.stages.size() == 1 && plan.fraction == 1.0 && plan.stages[0].tau_a == h && plan.stages[0].tau_v == h;
+}
+
+/// Second moment of the mass of a body with this inertia.
+Eigen::Matrix3d secondMoment(const Eigen::Matrix3d& inertia)
+{
+  return 0.5 * inertia.trace() * Eigen::Matrix3d::Identity() - inertia;
+}
+
+/// Of the antisymmetric part, twice.
+Eigen::Vector3d axialVector(const Eigen::Matrix3d& c)
+{
+  return {c(1, 2) - c(2, 1), c(2, 0) - c(0, 2), c(0, 1) - c(1, 0)};
+}
+
+}   // namespace
+
 BodySystem::BodySystem(const RigidBodyModel& model)
   : model_(model),
-    moment_(0.5 * model.inertia.trace() * Eigen::Matrix3d::Identity() - model.inertia)
+    moment_(secondMoment(model.inertia)),
+    whole_centre_(Eigen::Vector3d::Zero()),
+    whole_inertia_(model.inertia)
 {
 }
 
@@ -41,6 +66,9 @@ void BodySystem::load(const RigidBodyState& s)
   start_ = s.X_WB.orientation;
   velocity_ = s.velocity;
   acceleration_ = s.last_step > 0.0 ? Twist{s.linear_acceleration, s.angular_acceleration} : Twist{};
+  last_step_ = s.last_step;
+  previous_orientation_ = s.X_previous.orientation;
+  previous_w_ = s.velocity_previous.angular;
   const Eigen::Vector3d previous = rotationVector(s.X_previous.orientation * start_.conjugate());
   history_[kQ] = {s.X_WB.position, Eigen::Vector3d::Zero()};
   history_[kV] = {s.velocity.linear, s.velocity.angular};
@@ -57,7 +85,7 @@ BodySystem::Vector6 BodySystem::startAcceleration(const Vector6& wrench, const M
   inertia.topLeftCorner<3, 3>() += model_.mass * Eigen::Matrix3d::Identity();
   inertia.bottomRightCorner<3, 3>() += i_world;
   Vector6 load = wrench;
-  load.tail<3>() += model_.torque - w.cross(i_world * w);
+  load.tail<3>() += model_.torque - model_.angular_damping * (i_world * w) - w.cross(i_world * w);
   Cholesky6 factor;
   factor.compute(inertia);   // a body has mass, so the matrix is positive definite
   Vector6 a = load;
@@ -79,31 +107,75 @@ BodySystem::Motion BodySystem::combine(const Combination& c) const
   return sum;
 }
 
+Eigen::Vector3d BodySystem::momentum(const Eigen::Quaterniond& q, const Eigen::Vector3d& w) const
+{
+  return q * (whole_inertia_ * (q.conjugate() * w));
+}
+
 Eigen::Vector3d BodySystem::turnFromStart() const { return rotationVector(pose.orientation * start_.conjugate()); }
+
+void BodySystem::setWhole(const Eigen::Vector3d& centre, const Eigen::Matrix3d& inertia)
+{
+  whole_centre_ = centre;
+  whole_inertia_ = inertia;
+}
 
 void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, const Eigen::Vector3d& gravity)
 {
   const Stage& stage = plan.stages[index];
-  // predictor: the motion carried on
+  by_momentum_ = isImplicitEuler(plan, h);
+  // first trial: the motion carried on
   const double ahead = index == 0 ? stage.time * h : (stage.time - plan.stages[0].time) * h;
-  const Eigen::Vector3d w = velocity_.angular + ahead * acceleration_.angular;
+  const double c = model_.angular_damping;
+  // Damping acts by the velocity to come. With the present velocity strong damping would turn the motion round.
+  const Eigen::Vector3d w =
+      (velocity_.angular + ahead * (acceleration_.angular + c * velocity_.angular)) / (1.0 + ahead * c);
   pose.position = base_.position + ahead * velocity_.linear + 0.5 * ahead * ahead * acceleration_.linear;
   pose.orientation = (fromRotationVector(0.5 * ahead * (velocity_.angular + w)) * base_.orientation).normalized();
 
-  const Motion hat = combine(stage.q_hat), tilde = combine(stage.q_tilde);
-  const double square = stage.tau_a * stage.tau_a;
-  const auto rotation = [&](const Eigen::Vector3d& r) { return (fromRotationVector(r) * start_).toRotationMatrix(); };
-  inertia_target_ = hat.x;
-  inertia_rotation_ = rotation(hat.r) - square * skew(w) * skew(w) * pose.orientation.toRotationMatrix();
+  const Motion tilde = combine(stage.q_tilde);
   damping_target_ = tilde.x;
-  damping_rotation_ = rotation(tilde.r);
-  const double inertia = 1.0 / square, linear = model_.linear_damping / stage.tau_v,
+  damping_rotation_ = (fromRotationVector(tilde.r) * start_).toRotationMatrix();
+  if (by_momentum_)
+    moveFreely(h);
+  else
+    aimAhead(stage, w);
+  const double inertia = 1.0 / (stage.tau_a * stage.tau_a), linear = model_.linear_damping / stage.tau_v,
                angular = model_.angular_damping / stage.tau_v;
   weight_ = model_.mass * (inertia + linear);
   target_ = (inertia * inertia_target_ + linear * damping_target_) / (inertia + linear);
   rotation_weight_ = inertia + angular;
   rotation_target_ = (inertia * inertia_rotation_ + angular * damping_rotation_) / (inertia + angular);
   force_ = model_.force + (model_.gravity ? Eigen::Vector3d(model_.mass * gravity) : Eigen::Vector3d::Zero());
+}
+
+/// The targets of implicit Euler: where the body, with what it carries, would be after h seconds without forces. Its
+/// angular momentum is kept then. In the first trial the torque of the last step goes on.
+void BodySystem::moveFreely(double h)
+{
+  const Eigen::Vector3d arm = start_ * whole_centre_, start = momentum(start_, history_[kV].r);
+  pose.orientation = rotateFreely(whole_inertia_, start_, start, h);
+  inertia_rotation_ = pose.orientation.toRotationMatrix();
+  inertia_target_ =
+      history_[kQ].x + h * history_[kV].x + arm + h * history_[kV].r.cross(arm) - inertia_rotation_ * whole_centre_;
+  if (last_step_ == 0.0)
+    return;
+  const Eigen::Vector3d torque = (start - momentum(previous_orientation_, previous_w_)) / last_step_;
+  const Eigen::Vector3d turn = 0.5 * h * h * angularVelocity(whole_inertia_, pose.orientation, torque);
+  pose.orientation = (fromRotationVector(turn) * pose.orientation).normalized();
+}
+
+/// The targets of the other methods, by the angular velocity w of the first trial. Points of the body have the
+/// acceleration w x (w x r) beside that of the rotation vector, which R^ contains. With half of it in R~,
+/// (R - R~) / tau_v is the rate at the stage, without it the rate tau_v / 2 earlier, so that damping would be of first
+/// order.
+void BodySystem::aimAhead(const Stage& stage, const Eigen::Vector3d& w)
+{
+  const Motion hat = combine(stage.q_hat);
+  const Eigen::Matrix3d centripetal = skew(w) * skew(w) * pose.orientation.toRotationMatrix();
+  inertia_target_ = hat.x;
+  inertia_rotation_ = (fromRotationVector(hat.r) * start_).toRotationMatrix() - stage.tau_a * stage.tau_a * centripetal;
+  damping_rotation_ -= 0.5 * stage.tau_v * stage.tau_v * centripetal;
 }
 
 void BodySystem::hold(double weight, const Eigen::Vector3d& gravity)
@@ -126,8 +198,7 @@ void BodySystem::evaluate(bool with_hessian)
   // -tr(R^ J R^T exp(-[turn])) to second order in the turn
   const Eigen::Matrix3d c = rotation_target_ * moment_ * r.transpose();
   gradient.head<3>() = weight_ * d - force_;
-  gradient.tail<3>() =
-      rotation_weight_ * Eigen::Vector3d(c(1, 2) - c(2, 1), c(2, 0) - c(0, 2), c(0, 1) - c(1, 0)) - model_.torque;
+  gradient.tail<3>() = rotation_weight_ * axialVector(c) - model_.torque;
   if (!with_hessian)
     return;
   hessian.setZero();
@@ -162,34 +233,52 @@ void BodySystem::endStage(const Stage& stage, bool last)
   const double square = stage.tau_a * stage.tau_a;
   velocity_ = {(pose.position - tilde.x) / stage.tau_v, rotationRate(turn) * rate};
   acceleration_ = {(pose.position - hat.x) / square, rotationRate(turn) * (turn - hat.r) / square};
+  if (by_momentum_)
+    advanceMomentum(stage.tau_a);
   if (last)
     return;
   history_[kQStage] = {pose.position, turn};
   history_[kVStage] = {velocity_.linear, rate};
 }
 
-void BodySystem::finishStep(const StepPlan& plan, RigidBodyState& next)
+/// The angular momentum of the body, with what it carries, changes by the torque of everything but inertia, which at
+/// the solution is opposite to that of inertia.
+void BodySystem::advanceMomentum(double h)
+{
+  const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();
+  const Eigen::Vector3d turned = axialVector(inertia_rotation_ * secondMoment(whole_inertia_) * r.transpose());
+  const Eigen::Vector3d start = momentum(start_, history_[kV].r);
+  const Eigen::Vector3d before = start_ * whole_centre_, after = r * whole_centre_;
+  velocity_.angular = angularVelocity(whole_inertia_, pose.orientation, start + turned / h);
+  velocity_.linear = (pose.position + after - history_[kQ].x - before) / h - velocity_.angular.cross(after);
+  acceleration_ = {(velocity_.linear - history_[kV].x) / h, (velocity_.angular - history_[kV].r) / h};
+}
+
+/// Takes the motion on from the stage, which lies inside the step, to the end of the step.
+void BodySystem::carryOn(const StepPlan& plan)
 {
   const Stage& stage = plan.stages.back();
-  const double c = plan.fraction;
   const Motion hat = combine(stage.q_hat), tilde = combine(stage.q_tilde);
-  const double square = stage.tau_a * stage.tau_a;
   const auto carriedOn = [](const Eigen::Vector3d& from, const Eigen::Vector3d& to, double share) {
     return Eigen::Vector3d(from + (to - from) / share);
   };
-  Eigen::Vector3d turn = turnFromStart(), rate = (turn - tilde.r) / stage.tau_v, turn_rate = (turn - hat.r) / square;
-  if (c != 1.0)
-  {
-    // the stage lies inside the step
-    rate = carriedOn(history_[kV].r, rate, c);
-    turn /= c;
-    pose.position = carriedOn(history_[kQ].x, pose.position, c);
-    pose.orientation = (fromRotationVector(turn) * start_).normalized();
-    velocity_.linear = carriedOn(history_[kV].x, velocity_.linear, c);
-    velocity_.angular = rotationRate(turn) * rate;
-  }
-  next.linear_acceleration = carriedOn(history_[kA].x, acceleration_.linear, plan.a_fraction);
-  next.angular_acceleration = rotationRate(turn) * carriedOn(history_[kA].r, turn_rate, plan.a_fraction);
+  Eigen::Vector3d turn = turnFromStart();
+  const Eigen::Vector3d rate = carriedOn(history_[kV].r, (turn - tilde.r) / stage.tau_v, plan.fraction),
+                        turn_rate = (turn - hat.r) / (stage.tau_a * stage.tau_a);
+  turn /= plan.fraction;
+  pose.position = carriedOn(history_[kQ].x, pose.position, plan.fraction);
+  pose.orientation = (fromRotationVector(turn) * start_).normalized();
+  velocity_ = {carriedOn(history_[kV].x, velocity_.linear, plan.fraction), rotationRate(turn) * rate};
+  acceleration_ = {carriedOn(history_[kA].x, acceleration_.linear, plan.a_fraction),
+                   rotationRate(turn) * carriedOn(history_[kA].r, turn_rate, plan.a_fraction)};
+}
+
+void BodySystem::finishStep(const StepPlan& plan, RigidBodyState& next)
+{
+  if (plan.fraction != 1.0 || plan.a_fraction != 1.0)
+    carryOn(plan);
+  next.linear_acceleration = acceleration_.linear;
+  next.angular_acceleration = acceleration_.angular;
   next.X_previous = {history_[kQ].x, start_};
   next.velocity_previous = {history_[kV].x, history_[kV].r};
   next.X_WB = pose;

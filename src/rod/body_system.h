@@ -14,6 +14,10 @@ namespace slender {
 ///   1/2 m |p - p^|^2 + 1/2 tr((R - R^) J (R - R^)^T), J the second moment of the mass,
 /// as if the body were a set of points x = p + R r that follow targets x^ = p^ + R^ r; R^ includes the centripetal
 /// acceleration. Unknowns: displacement and turn (world axes) from the base pose.
+///
+/// Implicit Euler differs. Its p^ and R^ are where the body, together with the points that it carries, would be at the
+/// end of the step without forces. The torque of everything else changes the angular momentum, and the velocity follows
+/// from the momentum, which a finite difference of the rotation would not keep.
 class BodySystem
 {
 public:
@@ -28,6 +32,8 @@ public:
   /// extra mass.
   Vector6 startAcceleration(const Vector6& wrench, const Matrix6& extra_inertia);
 
+  /// Centre of mass (body axes), and inertia about it, of the body with the points that it carries.
+  void setWhole(const Eigen::Vector3d& centre, const Eigen::Matrix3d& inertia);
   void beginStage(const StepPlan& plan, std::size_t stage, double h, const Eigen::Vector3d& gravity);
   /// Targets x^ (of inertia) and x~ (of damping) of a point that goes with the body; r in body axes.
   Eigen::Vector3d inertiaTarget(const Eigen::Vector3d& r) const { return inertia_target_ + inertia_rotation_ * r; }
@@ -61,14 +67,25 @@ private:
   };
   Motion combine(const Combination& c) const;
   Eigen::Vector3d turnFromStart() const;
+  Eigen::Vector3d momentum(const Eigen::Quaterniond& q, const Eigen::Vector3d& w) const;
+  void moveFreely(double h);
+  void aimAhead(const Stage& stage, const Eigen::Vector3d& w);
+  void advanceMomentum(double h);
+  void carryOn(const StepPlan& plan);
 
   const RigidBodyModel& model_;
   Eigen::Matrix3d moment_;   ///< J, body axes
   std::array<Motion, kHistoryCount> history_;
   Eigen::Quaterniond start_;
+  double last_step_ = 0;   ///< 0: there is no state before
+  Eigen::Quaterniond previous_orientation_;
+  Eigen::Vector3d previous_w_;
   Pose base_, saved_;
   Twist velocity_, acceleration_;   ///< where the last stage ended
   double energy_ = 0, weight_ = 0, rotation_weight_ = 0;
+  bool by_momentum_ = false;        ///< in this stage
+  Eigen::Vector3d whole_centre_;    ///< of the body with what it carries, body axes
+  Eigen::Matrix3d whole_inertia_;   ///< about this centre
   Eigen::Vector3d target_, force_;
   Eigen::Matrix3d rotation_target_;
   Eigen::Vector3d inertia_target_, damping_target_;       ///< p^, p~

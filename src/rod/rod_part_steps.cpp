@@ -34,7 +34,8 @@ void RodPart::addStartLoads()
     {
       const Eigen::Vector3d r = rod_.work.x.col(i) - body.pose.position, w = body.velocity().angular;
       const double m = rod_.model->mass[i];
-      const Eigen::Vector3d force = -system.nodeGradient(i) - m * w.cross(w.cross(r));
+      const Eigen::Vector3d force =
+          -system.nodeGradient(i) - rod_.model->damping(i) * rod_.work.v.col(i) - m * w.cross(w.cross(r));
       wrench.head<3>() += force;
       wrench.tail<3>() += r.cross(force);
       inertia.topLeftCorner<3, 3>() += m * Eigen::Matrix3d::Identity();

@@ -143,6 +143,26 @@ TEST(Allocations, WarmProjectedStepsMakeNone)
   }
 }
 
+TEST(Allocations, WarmStepsOfABodyMakeNone)
+{
+  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::tr_bdf2})
+  {
+    Group g;
+    g.addBody(bodyOf(1.0, {1, 2, 3}), {}, {{0, 0, 1}, {1, 20, 3}});
+    g.setGravity(Vector3d::Zero());
+    World world = g.world(withIntegrator(integrator), 2e-3);
+    const auto advance = [&] { return world.step(g.state, g.inputs).ok; };
+    for (int k = 0; k < 20; ++k)
+      ASSERT_TRUE(advance());
+    const long before = allocations;
+    bool ok = true;
+    for (int k = 0; k < 20; ++k)
+      ok = advance() && ok;
+    EXPECT_EQ(allocations - before, 0) << toString(integrator);
+    EXPECT_TRUE(ok);
+  }
+}
+
 TEST(Allocations, WarmProjectedStepsWithBodiesMakeNone)
 {
   Group g = tee();
