@@ -76,6 +76,7 @@ void IslandScheduler::arrange(WorldState& state, const WorldInputs& inputs)
 {
   const int count = finder_.find();
   islands_.clear();
+  statics_.reset();
   for (int k = 0; k < count; ++k)
   {
     finder_.partsOf(k, places_);
