@@ -363,6 +363,28 @@ bodies:
   EXPECT_NEAR(held + up(0), weight, 1e-2 * weight);
 }
 
+/// Damping takes nothing of what a floor bears.
+TEST(RecordedFields, ContactForcesOfDampedClothCarryItsWeight)
+{
+  for (const char* damping : {"{}", "{mass: 10}", "{mass: 100}", "{drag: 2}"})
+  {
+    Simulation simulation = simulationOf(R"(
+time: {step: 0.01}
+record: {fields: [contact_force]}
+cloths:
+  - name: sheet
+    grid: {corner: [-0.2, -0.2, 0.0021], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: 8}
+    material: {area_density: 0.2}
+    contact: {thickness: 0.004, method: impulses}
+obstacles: [{name: floor, shape: {plane: {}}}]
+)",
+                                         {std::string("cloths.0.damping=") + damping});
+    runSteps(simulation, 100);
+    const double weight = 9.81 * simulation.clothModel(0).totalMass();
+    EXPECT_NEAR(column(fieldTablesOf(simulation).at(0), "contact_fz [N]").sum(), weight, 1e-3 * weight) << damping;
+  }
+}
+
 TEST(RecordedFields, AreWrittenOnlyWhenAskedFor)
 {
   const std::string folder = testing::TempDir() + "recorded_fields";
