@@ -235,15 +235,17 @@ void BodyPart::solveStartAcceleration()
 
 void BodyPart::beginStage(std::size_t stage) { system.beginStage(*plan_, stage, length_, gravity); }
 
-void BodyPart::endStage(std::size_t stage, bool last, StepReport&)
+void BodyPart::endStage(std::size_t stage, bool last, StepReport& report)
 {
   system.accept();
   system.endStage(plan_->stages[stage], last);
-  if (last)
-  {
-    system.finishStep(*plan_, next_);
-    next_.last_step = length_;
-  }
+  if (!last)
+    return;
+  system.finishStep(*plan_, next_);
+  next_.last_step = length_;
+  const double gyration = std::sqrt(0.5 * system.model().inertia.trace() / system.model().mass);
+  report.error_estimate =
+      std::max(report.error_estimate, system.localError(*plan_, length_, std::max(reach_, gyration), next_));
 }
 
 double BodyPart::energyOf(const RigidBodyState& s) const
