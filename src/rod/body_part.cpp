@@ -263,9 +263,13 @@ double BodyPart::energyAtStart(double& allowance)
   return energy;
 }
 
-void BodyPart::refuse(StepFailure failure, double, StepReport& report) const
+void BodyPart::refuse(StepFailure failure, double length, StepReport& report) const
 {
-  report.refuse(failure, "body '" + system.model().name + "': its motion was not found: use a shorter step");
+  const bool squeezed = failure == StepFailure::squeezed;
+  report.refuse(failure, "body '" + system.model().name +
+                             "': " + (squeezed ? "what it touches leaves it no room" : "its motion was not found") +
+                             " at a step of " + milliseconds(length) + ": use a shorter step" +
+                             (squeezed ? ", or slow down what is driven" : ""));
 }
 
 }   // namespace slender
