@@ -70,6 +70,13 @@ TEST(ReaderSolids, contactOfAnyKindMakesImplicitEulerTheDefault)
   EXPECT_THROW(parseScene(ball + "}]" + floor, "test.yaml", {"time.integrator=symplectic_euler"}), SceneError);
 }
 
+TEST(ReaderSolids, saysThatASceneHasNoRodsToWeldTo)
+{
+  EXPECT_NE(problemsOf("bodies: [{mass: 1, inertia: [1, 1, 1], welds: [{rod: rope, edge: 0}]}]", {})
+                .find("rod = rope: is no rod of the scene, which has none"),
+            std::string::npos);
+}
+
 TEST(ReaderSolids, tellsThatContactChoosesTheIntegratorOfRodsWithoutIt)
 {
   EXPECT_EQ(parseScene(solid_scene).notes.size(), 1u);   // the ring has no contact
