@@ -169,20 +169,22 @@ void checkContactTime(const YamlCursor& time, SceneConfig& scene)
           "contact makes implicit_euler the default integrator of the whole scene, also of rods without contact; give "
           "time.integrator to choose");
   }
-  else if (touches && scene.time.integrator != Integrator::implicit_euler &&
-           scene.time.integrator != Integrator::symplectic_euler)
+  else if (touches && (scene.time.integrator == Integrator::bdf2 || scene.time.integrator == Integrator::tr_bdf2))
   {
     time.find("integrator")
         .warning(
             "of second order carries the velocity before an impact beyond it, so that a rod or body may bounce higher "
             "than it fell: use implicit_euler, the default with contact, where something is hit");
   }
-  if (touches && scene.time.integrator == Integrator::symplectic_euler)
+  const bool ends_ahead =
+      scene.time.integrator == Integrator::implicit_midpoint || scene.time.integrator == Integrator::generalized_alpha;
+  if (touches && (ends_ahead || scene.time.integrator == Integrator::symplectic_euler))
   {
     time.find("integrator")
-        .problem(
-            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, bdf2 or tr_bdf2, "
-            "or nothing may have contact (bodies: contact: false)");
+        .problem(std::string("takes no contact, ") +
+                 (ends_ahead ? "because its steps end beyond where contact keeps surfaces apart"
+                             : "whose forces are too stiff for explicit steps") +
+                 "; " + mustBe(scene) + ", or nothing may have contact (bodies: contact: false)");
   }
 }
 
