@@ -89,8 +89,8 @@ std::string ClothWork::explain(StepFailure failure, double length) const
   if (failure == StepFailure::state_not_finite)
     return "the configuration overflowed" + at + ": use a shorter step or check the inputs for jumps";
   return "Newton's method did not converge" + at +
-         ": use a shorter step, more time.newton.max_iterations or max_cuts, move the pins slowly, or start from a "
-         "shape whose faces have area";
+         ": use a shorter step, more time.newton.max_iterations or max_cuts, move " +
+         (work_.pins.empty() ? "what touches it" : "the pins") + " slowly, or start from a shape whose faces have area";
 }
 
 StepReport ClothWork::refuseUnsolved(StepReport& report, StepFailure failure, double length, const char* why)

@@ -26,6 +26,7 @@ public:
   double value(const double* x) const override;
   double addGradient(const double* x, double* gradient) const override;
   void addHessian(double* values) const override;
+  const Eigen::Matrix3d& stiffness(int vertex) const override { return drag_[vertex]; }
   double work(const PointVector& from, const PointVector& to, const std::vector<char>& held) const override;
   void addForces(const PointVector& x, const PointVector& v, const Eigen::Vector3d& wind,
                  PointVector& force) const override;

@@ -53,6 +53,7 @@ Stage backwardDifference(double tau, double newest, double oldest, History q_new
 
 void planStep(Integrator integrator, double spectral_radius, double h, double previous_step, StepPlan& plan)
 {
+  plan.integrator = integrator;
   plan.stages.clear();
   plan.fraction = plan.a_fraction = 1.0;
   plan.needs_acceleration = false;

@@ -47,6 +47,7 @@ public:
 
 protected:
   void settleStably(bool leave_saddles);
+  RodEvaluation load();
   Equations& equations() { return *equations_; }
 
   /// Loads the present configuration of all parts.
@@ -68,7 +69,6 @@ private:
   bool leaveSaddle(const EquilibriumStability& at);
   EquilibriumStability assess(bool spectrum);
   bool displace(double turn);
-  RodEvaluation load();
   bool definite(double rate);
   double neutralBand() const;
   double rounding() const;

@@ -22,18 +22,18 @@ public:
   /// c: averages x points; must outlive it.
   explicit AverageProjection(const Averages& c);
 
-  /// For points of these masses [kg], which are always the same, of which isFree(point) may move. False: averages
-  /// depend on each other on these.
+  /// For points of these masses [kg], of which isFree(point) may move. False: averages depend on each other on these.
   template <class IsFree>
-  bool prepare(const Eigen::VectorXd& mass, const IsFree& isFree)
+  bool prepare(const Eigen::Ref<const Eigen::VectorXd>& mass, const IsFree& isFree)
   {
     bool known = true;
     for (Eigen::Index j = 0; j < c_.cols(); ++j)
     {
       const char is_free = isFree(static_cast<int>(j));
-      known = known && free_[j] == is_free;
+      const double give = is_free ? 1.0 / mass[j] : 0.0;
+      known = known && free_[j] == is_free && give_[j] == give;
       free_[j] = is_free;
-      give_[j] = is_free ? 1.0 / mass[j] : 0.0;
+      give_[j] = give;
     }
     if (!known)
       independent_ = factor();

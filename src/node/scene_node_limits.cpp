@@ -25,10 +25,10 @@ bool SceneNode::mindLimits(const std::vector<LimitExcess>& begun)
              static_cast<unsigned long>(limits_silent_));
     limits_silent_ = 0;
   }
-  for (const int grasp : limits_->released())
+  for (const auto& [grasp, why] : limits_->released())
   {
-    ROS_WARN("%s: grasp %s is released, because a limit is exceeded (on_limit: release)", who.c_str(),
-             topics_->grasps[static_cast<std::size_t>(grasp)].c_str());
+    ROS_WARN("%s: grasp %s is released, because a limit is exceeded (on_limit: release): %s", who.c_str(),
+             topics_->grasps[static_cast<std::size_t>(grasp)].c_str(), why.c_str());
     slender_sim::SetGrasp::Request request;
     request.name = topics_->grasps[static_cast<std::size_t>(grasp)];
     request.action = slender_sim::SetGrasp::Request::RELEASE;

@@ -243,15 +243,17 @@ void BodyPart::beginStage(std::size_t stage)
   system.beginStage(*plan_, stage, length_, gravity);
 }
 
-void BodyPart::endStage(std::size_t stage, bool last, StepReport&)
+void BodyPart::endStage(std::size_t stage, bool last, StepReport& report)
 {
   system.accept();
   system.endStage(plan_->stages[stage], last);
-  if (last)
-  {
-    system.finishStep(*plan_, next_);
-    next_.last_step = length_;
-  }
+  if (!last)
+    return;
+  system.finishStep(*plan_, next_);
+  next_.last_step = length_;
+  const double gyration = std::sqrt(0.5 * system.model().inertia.trace() / system.model().mass);
+  report.error_estimate =
+      std::max(report.error_estimate, system.localError(*plan_, length_, std::max(reach_, gyration), next_));
 }
 
 double BodyPart::energyOf(const RigidBodyState& s) const
@@ -269,9 +271,13 @@ double BodyPart::energyAtStart(double& allowance)
   return energy;
 }
 
-void BodyPart::refuse(StepFailure failure, double, StepReport& report) const
+void BodyPart::refuse(StepFailure failure, double length, StepReport& report) const
 {
-  report.refuse(failure, "body '" + system.model().name + "': its motion was not found: use a shorter step");
+  const bool squeezed = failure == StepFailure::squeezed;
+  report.refuse(failure, "body '" + system.model().name +
+                             "': " + (squeezed ? "what it touches leaves it no room" : "its motion was not found") +
+                             " at a step of " + milliseconds(length) + ": use a shorter step" +
+                             (squeezed ? ", or slow down what is driven" : ""));
 }
 
 }   // namespace slender

@@ -112,7 +112,7 @@ private:
   BoundingBox surfaceBox(double ahead) const override;
   BarrierRange barrierRange(double) const override;
   void beginStage(std::size_t stage) override;
-  void endStage(std::size_t stage, bool last, StepReport&) override;
+  void endStage(std::size_t stage, bool last, StepReport& report) override;
   void acceptSubstep(const Substep&) override { std::swap(now_, next_); }
   bool conserves() const override { return true; }
   double energyAtStart(double& allowance) override;

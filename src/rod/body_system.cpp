@@ -285,4 +285,12 @@ void BodySystem::finishStep(const StepPlan& plan, RigidBodyState& next)
   next.velocity = velocity_;
 }
 
+double BodySystem::localError(const StepPlan& plan, double h, double reach, const RigidBodyState& next) const
+{
+  const double before = order(plan.integrator) == 2 ? 1.0 : 0.0;
+  return errorConstant(plan.integrator) * h * h *
+         ((next.linear_acceleration - before * history_[kA].x).norm() +
+          reach * (next.angular_acceleration - before * history_[kA].r).norm());
+}
+
 }   // namespace slender

@@ -43,6 +43,8 @@ public:
   /// Takes over the stage's solution.
   void endStage(const Stage& stage, bool last);
   void finishStep(const StepPlan& plan, RigidBodyState& next);
+  /// Estimated error [m] of the step of h seconds that ended in `next`, as far as `reach` [m] from the centre.
+  double localError(const StepPlan& plan, double h, double reach, const RigidBodyState& next) const;
   /// Of the last stage begun and ended.
   const Twist& velocity() const { return velocity_; }
 

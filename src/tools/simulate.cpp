@@ -213,8 +213,11 @@ public:
 private:
   bool tell(const std::vector<slender::LimitExcess>& begun, Progress& progress)
   {
+    const auto& released = watch_.released();
     for (const slender::LimitExcess& excess : begun)
     {
+      if (std::any_of(released.begin(), released.end(), [&](const auto& r) { return r.why == excess.text; }))
+        continue;
       std::optional<double>& told = told_[static_cast<std::size_t>(excess.kind)];
       if (told && simulation_.state().time < *told + 1.0)
         continue;
@@ -223,10 +226,10 @@ private:
       std::fprintf(stderr, "simulate: warning: %s%s\n", excess.text.c_str(),
                    watch_.held().empty() ? "" : "; all driven objects stay in place from now on (on_limit: hold)");
     }
-    for (const int grasp : watch_.released())
+    for (const auto& [grasp, why] : released)
     {
       progress.clear();
-      std::fprintf(stderr, "simulate: warning: grasp '%s' is released (on_limit: release)\n",
+      std::fprintf(stderr, "simulate: warning: %s; grasp '%s' is released (on_limit: release)\n", why.c_str(),
                    simulation_.grasps()[static_cast<std::size_t>(grasp)].config->name.c_str());
     }
     if (watch_.stopped().empty())

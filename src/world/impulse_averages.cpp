@@ -90,7 +90,8 @@ ImpulseCloths::AverageCorrection& ImpulseCloths::prepareCorrection(std::size_t k
     to.gap.assign(4 * static_cast<std::size_t>(to.projection->count()), 0.0);
     to.multipliers = to.gap;
   }
-  to.projection->prepare(cloth(k).model->mass, [&](int i) { return inverse_mass_[first_[k] + i] > 0.0; });
+  to.projection->prepare(inertia_.segment(first_[k], first_[k + 1] - first_[k]),
+                         [&](int i) { return inverse_mass_[first_[k] + i] > 0.0; });
   return to;
 }
 

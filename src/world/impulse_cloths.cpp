@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cloth/cloth_stepper_impl.h"
 #include "slender_sim/contact/ccd.h"
 #include "slender_sim/contact/intersection.h"
 #include "slender_sim/dynamics/integrator.h"
@@ -86,6 +87,7 @@ ImpulseCloths::ImpulseCloths(const WorldModel& world, std::vector<int> cloths)
   for (Eigen::Matrix3Xd* m :
        {&x_start_, &x_, &v_, &v_before_, &push_, &answer_, &contact_forces_, &contact_sums_, &contact_now_})
     m->setZero(3, vertices());
+  inertia_.resize(vertices());
   inverse_mass_.resize(vertices());
   order_.resize(cloths_.size());
   inputs_.resize(cloths_.size());
@@ -363,7 +365,9 @@ CollisionReport ImpulseCloths::collide(double h)
     x_start_.middleCols(first, count) = work_.cloths[k].x;
     x_.middleCols(first, count) = next_.cloths[k].x;
     v_.middleCols(first, count) = next_.cloths[k].v;
-    inverse_mass_.segment(first, count) = steppers_[k].model().mass.cwiseInverse();
+    for (int i = 0; i < count; ++i)
+      inertia_[first + i] = steppers_[k].impl().inertia(i, h);
+    inverse_mass_.segment(first, count) = inertia_.segment(first, count).cwiseInverse();
     for (const int pin : work_.cloths[k].pins)
       inverse_mass_[first + pin] = 0.0;
     shared_pins_[k].setZero(3, static_cast<Eigen::Index>(work_.cloths[k].pins.size()));

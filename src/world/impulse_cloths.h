@@ -154,7 +154,8 @@ private:
   Eigen::Matrix3Xd contact_forces_, contact_sums_, contact_now_;
   Eigen::Matrix3Xd x_start_, x_, v_, v_before_;
   Eigen::Matrix3Xd corrected_, push_, answer_, own_push_, own_answer_;
-  Eigen::VectorXd inverse_mass_;
+  /// Per point [kg], see ClothStepper::Impl::inertia(); inverse: 0 where held.
+  Eigen::VectorXd inertia_, inverse_mass_;
 };
 
 }   // namespace slender

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "world_statics.h"
-
 namespace slender {
 
 IslandScheduler::IslandScheduler(const WorldModel& world, bool leaders, WorldState& state)
@@ -55,6 +53,7 @@ void IslandScheduler::addContacts(ContactLoads& out) const
 void IslandScheduler::forgetContacts()
 {
   islands_.clear();
+  statics_.reset();
   if (objects_.impulses)
     objects_.impulses->forgetContacts();
 }
@@ -80,8 +79,11 @@ Eigen::Matrix3Xd IslandScheduler::contactForces(const WorldObject& object, const
 Eigen::Matrix3Xd IslandScheduler::contactForces(const ObjectRef& of) const
 {
   if (of.kind == ObjectRef::rod)
-    return contactForces(objects_.rods.at(of.index), *objects_.rods[of.index].part,
-                         objects_.rods[of.index].stepper->model->nodes());
+  {
+    const RodObject* in_statics = statics_ ? findObject(statics_->objects().rods, of.index) : nullptr;
+    const RodObject& rod = in_statics ? *in_statics : objects_.rods.at(of.index);
+    return contactForces(rod, *rod.part, rod.stepper->model->nodes());
+  }
   if (const ClothObject* cloth = findObject(objects_.cloths, of.index))
     return contactForces(*cloth, cloth->part(), cloth->part().points());
   return objects_.impulses->contactForces(of.index);
@@ -114,8 +116,15 @@ StepReport IslandScheduler::solveEquilibrium(WorldState& state, const WorldInput
   for (ClothObject& cloth : objects_.cloths)
     if (total.ok)
       total.merge(cloth.solveEquilibrium(state, inputs));
+  std::unique_ptr<WorldStatics> together;
   if (total.ok && !(objects_.rods.empty() && objects_.bodies.empty()))
-    total.merge(solveStatics(objects_, threads_, state, inputs));
+    total.merge(solveStatics(objects_, threads_, state, inputs, together));
+  if (!total.ok)
+    return total;
+  forgetContacts();
+  statics_ = std::move(together);
+  if (statics_)
+    islands_.push_back(&statics_->island());
   return total;
 }
 

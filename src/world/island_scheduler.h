@@ -2,11 +2,13 @@
 
 #include <exception>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "island_finder.h"
 #include "object_island.h"
 #include "world_objects.h"
+#include "world_statics.h"
 
 namespace slender {
 
@@ -67,7 +69,8 @@ private:
   std::vector<IslandFinder::Reach> reach_;           ///< per object
   std::vector<Part*> parts_;                         ///< of one object
   std::map<std::vector<int>, ObjectIsland> known_;   ///< islands that have been needed, by the places of their objects
-  std::vector<ObjectIsland*> islands_;               ///< of the present step
+  std::vector<ObjectIsland*> islands_;               ///< of the present step, or the only one of the statics
+  std::unique_ptr<WorldStatics> statics_;            ///< of the present equilibrium; null: a step came after it
   std::vector<int> places_;                          ///< objects of one island
   int threads_ = 0;                                  ///< See parallelFor().
   std::vector<StepReport> reports_;                  ///< of the islands that step in parallel

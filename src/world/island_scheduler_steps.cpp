@@ -76,6 +76,7 @@ void IslandScheduler::arrange(WorldState& state, const WorldInputs& inputs)
 {
   const int count = finder_.find();
   islands_.clear();
+  statics_.reset();
   for (int k = 0; k < count; ++k)
   {
     finder_.partsOf(k, places_);
@@ -203,24 +204,22 @@ void IslandScheduler::checkClearance(WorldState& state)
   for (const WorldSolid& solid : objects_.solids)
   {
     const int index = solid.index;
+    Pose pose;
     if (solid.kind == WorldSolid::Kind::obstacle)
-      meeting.addSolid("obstacle '" + world_.obstacles[index].name + "'", solid.asTouched(objects_.all),
-                       state.obstacles[index]);
+      pose = state.obstacles[index];
     else if (solid.kind == WorldSolid::Kind::body)
-      meeting.addSolid("body '" + world_.bodies[index].body.name + "'", solid.asTouched(objects_.all),
-                       state.bodies[index].X_WB * world_.bodies[index].X_BS);
+      pose = state.bodies[index].X_WB * world_.bodies[index].X_BS;
     else
-      meeting.addSolid(
-          "its floor", solid.asTouched(objects_.all),
-          {Eigen::Vector3d(0, 0, world_.threads[index].model->floor.height), Eigen::Quaterniond::Identity()});
+      pose.position.z() = world_.threads[index].model->floor.height;
+    meeting.addSolid(solid.name(), solid.asTouched(objects_.all), pose);
   }
   const double room = ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses);
   // Less than what rounding errors of positions leave, or barriers resolve, is none.
   const double least = std::max(1e-9 * world_.contact.gap, 1e-11 * meeting.x.cwiseAbs().maxCoeff());
   if (!(room > least))
-    throw std::invalid_argument(meeting.nearest(world_.contact) + " touch or cross by " +
-                                std::to_string(1e3 * std::max(0.0, -room)) +
-                                " mm as the scene starts: move them apart, or make them thinner");
+    throw std::invalid_argument(meeting.nearest(world_.contact) +
+                                (room < -least ? " cross by " + shortNumber(-1e3 * room, 4) + " mm" : " touch") +
+                                " as the scene starts: move them apart, or make them thinner");
   fitRanges(meeting, state);
 }
 

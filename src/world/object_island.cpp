@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+
+#include "slender_sim/contact/solids.h"
 
 namespace slender {
 
@@ -290,11 +293,76 @@ StepReport ObjectIsland::step(double duration)
     report = island_.step(duration, first);
   stepped_ = report.ok;
   if (!report.ok)
+  {
+    blameSolids(report);
     return report;
+  }
   for (const RodObject* rod : rods_)
     rod->stepper->work.next_step = first;
   trace();
   return report;
+}
+
+/// Names the two solids that move as prescribed and press most on an object from opposite sides where the failed step
+/// got stuck, if they come nearer to each other there.
+void ObjectIsland::blameSolids(StepReport& report)
+{
+  if (!contact() || (report.failure != StepFailure::squeezed && report.failure != StepFailure::newton_diverged))
+    return;
+  struct Press
+  {
+    Eigen::Vector3d force = Eigen::Vector3d::Zero(), at = force;
+    double most = 0.0;
+  };
+  std::map<std::pair<int, int>, Press> presses;   // by the place of an object, and the solid
+  const std::vector<IslandSolid>& solids = island_.equations().solids;
+  const std::vector<Pose>& now = island_.equations().startSolids();
+  ContactPotential& potential = *island_.equations().contact();
+  potential.setSprings({});   // without friction
+  potential.begin(island_.equations().startPoints(), now, world_.time.step);
+  potential.evaluate(island_.equations().startPoints(), now, false);
+  for (const ContactTerm& term : potential.terms())
+    if (term.solid >= 0 && !solids[term.solid].body && solids_[term.solid]->kind != WorldSolid::Kind::floor)
+      forParts([&](const WorldObject& object, std::size_t part) {
+        if (const int point = term.point[0] - parts_[part]->first_point; point < 0 || point >= parts_[part]->points())
+          return;
+        Press& press = presses[{object.place, term.solid}];
+        press.force += term.force;
+        if (term.force.norm() > press.most)
+        {
+          press.most = term.force.norm();
+          press.at = term.position;
+        }
+      });
+  double most = 0.0;
+  auto first = presses.end(), second = first;
+  for (auto a = presses.begin(); a != presses.end(); ++a)
+    for (auto b = std::next(a); b != presses.end() && b->first.first == a->first.first; ++b)
+    {
+      const double one = a->second.force.norm(), other = b->second.force.norm();
+      if (std::min(one, other) <= most || a->second.force.dot(b->second.force) > -0.5 * one * other)
+        continue;
+      most = std::min(one, other);
+      first = a;
+      second = b;
+    }
+  if (!(most > 0.0))
+    return;
+  const int k = first->first.second, l = second->first.second;
+  const auto room = [&](const Pose& X_WK, const Pose& X_WL) {
+    const Eigen::Vector3d at = X_WK * (now[k].inverse() * first->second.at);
+    return distanceToShape(solids_[l]->obstacle.shape, X_WL, at, at);
+  };
+  const auto end = [&](int solid) { return solids[solid].target.X_WG * solids[solid].X_BS; };
+  const double needed = room(now[k], now[l]), left = room(end(k), end(l));
+  if (!(left < needed))
+    return;
+  report.failure = StepFailure::squeezed;
+  report.message = solids_[k]->name() + " and " + solids_[l]->name() + " leave " +
+                   shared_.all[first->first.first]->name() + " too little room: it needs more than " +
+                   shortNumber(1e3 * needed, 4) + " mm between them, and they are to be " +
+                   shortNumber(1e3 * std::max(0.0, left), 4) +
+                   " mm apart at the end of the step. Keep them farther apart. In detail: " + report.message;
 }
 
 /// The boxes of its objects from those of their parts.

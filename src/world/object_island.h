@@ -55,6 +55,7 @@ private:
   void takeSprings(WorldState& state);
   void giveSprings(WorldState& state) const;
   bool isDivisible() const;
+  void blameSolids(StepReport& report);
   template <class F>
   void forParts(F&& f) const;
   void trace();

@@ -87,6 +87,11 @@ ContactSolid WorldSolid::asTouched(const std::vector<WorldObject*>& by) const
   return touched;
 }
 
+std::string WorldSolid::name() const
+{
+  return kind == Kind::floor ? "its floor" : (kind == Kind::body ? "body '" : "obstacle '") + obstacle.name + "'";
+}
+
 // ---- all of them
 
 void WorldObjects::addBodies()

@@ -32,6 +32,7 @@ struct WorldSolid
   Pose X_BS{};                                 ///< in the frame of the body
   std::vector<const WorldObject*> ignores{};   ///< that never touch it: its body, and rods that are welded into it
 
+  std::string name() const;   ///< "obstacle 'table'"
   /// Not of a floor.
   ObjectRef partner() const { return {kind == Kind::body ? ObjectRef::body : ObjectRef::obstacle, index}; }
   /// For a contact of these objects, without the pose.

@@ -233,6 +233,7 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
   if (settle(time_.step))
   {
     settleStably(true);
+    load();   // a search for a way down from a saddle leaves contacts of other places
     report_.message.clear();
     copy(work_, state);
     for (const RodObject& rod : objects_.rods)
@@ -242,7 +243,8 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
   return report_.refuse(failure_, report_.message.empty() ? explainStatics(failure_) : report_.message);
 }
 
-StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs)
+StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs,
+                        std::unique_ptr<WorldStatics>& together)
 {
   StepReport total;
   if (!objects.takeInputs(state, inputs, total))
@@ -256,9 +258,9 @@ StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, c
   }
   if (!meet || !total.ok)
     return total;
-  WorldStatics statics(objects);
-  statics.setThreads(threads);
-  total.merge(statics.solve(state, inputs));
+  together = std::make_unique<WorldStatics>(objects);
+  together->setThreads(threads);
+  total.merge(together->solve(state, inputs));
   return total;
 }
 

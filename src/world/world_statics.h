@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "island/statics.h"
 #include "object_island.h"
 #include "world_objects.h"
@@ -16,9 +18,13 @@ public:
   /// The objects must outlive the statics.
   explicit WorldStatics(WorldObjects& objects);
   void setThreads(int threads) { island_.setThreads(threads); }
+  ObjectIsland& island() { return island_; }
+  /// Its own ones, which the contacts of its island are about.
+  const WorldObjects& objects() const { return objects_; }
 
   /// Solves under the inputs. Velocities become zero, and what is driven is where its inputs put it. The wrenches of
-  /// the objects become those of the equilibrium. On failure the state is untouched and the report says why.
+  /// the objects, and the contacts of the island, become those of the equilibrium. On failure the state is untouched
+  /// and the report says why.
   StepReport solve(WorldState& state, const WorldInputs& inputs);
 
 private:
@@ -45,8 +51,9 @@ private:
   double lever_;               ///< divides moments to compare them with forces: the shortest edge [m]
 };
 
-/// The stable equilibrium of all rods and bodies: rods that meet nothing each on its own, the others as one island. On
-/// failure the rods that were solved before have moved.
-StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs);
+/// The stable equilibrium of all rods and bodies: rods that meet nothing each on its own, the others as one island,
+/// which becomes `together`. On failure the rods that were solved before have moved.
+StepReport solveStatics(WorldObjects& objects, int threads, WorldState& state, const WorldInputs& inputs,
+                        std::unique_ptr<WorldStatics>& together);
 
 }   // namespace slender

@@ -171,6 +171,31 @@ TEST(RigidBodies, DampingHasTheIntegratorsOrder)
   }
 }
 
+/// A body that is thrown: implicit Euler falls by g h t / 2 too far.
+TEST(RigidBodies, ErrorControlShortensTheirSteps)
+{
+  const auto errorOf = [](double tolerance) {
+    Group g;
+    g.addBody(bodyOf(1.0, {0.01, 0.02, 0.03}), {}, {Vector3d(1, 0, 2), Vector3d(0.1, 10, 0.1)});
+    TimeConfig time = withIntegrator(Integrator::implicit_euler);
+    time.error_tolerance = tolerance;
+    World world = g.world(time, 0.01);
+    for (int k = 0; k < 50; ++k)
+    {
+      const StepReport report = world.step(g.state, g.inputs);
+      EXPECT_TRUE(report.ok) << report.message;
+      if (tolerance > 0)
+        EXPECT_LE(report.error_estimate, tolerance);
+    }
+    return std::abs(g.state.bodies[0].X_WB.position.z() - (2 * 0.5 - 0.5 * 9.81 * 0.25));
+  };
+  const double fixed = errorOf(0.0), coarse = errorOf(1e-4), fine = errorOf(1e-6);
+  EXPECT_NEAR(fixed, 0.5 * 9.81 * 0.01 * 0.5, 1e-6);
+  // of steps as short as sqrt(2 tolerance / g)
+  EXPECT_LT(coarse, 0.5 * 9.81 * 0.5 * std::sqrt(2e-4 / 9.81));
+  EXPECT_LT(fine, 0.5 * 9.81 * 0.5 * std::sqrt(2e-6 / 9.81));
+}
+
 TEST(RigidBodies, TorsionalPendulum)
 {
   // T = 2 pi sqrt(J L / beta); the rod's own polar inertia is not modelled, its nodes have no extent

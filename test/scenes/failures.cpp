@@ -198,6 +198,42 @@ cloths:
               at.from(0.5, 0, 0.5) - 0.1, rounding);
 }
 
+/// Two fingers that close on what stands between them, from and to these distances [m] of their middles.
+std::string fingers(double from, double to)
+{
+  const auto finger = [&](const std::string& name, const std::string& sign) {
+    return "  - {name: " + name + ", shape: {box: {size: [0.02, 0.06, 0.03]}}, friction: 1, motion: {table: [[0, " +
+           sign + std::to_string(0.5 * from) + ", 0, 0.06], [0.1, " + sign + std::to_string(0.5 * to) +
+           ", 0, 0.06]]}}\n";
+  };
+  return "time: {step: 0.005, duration: 0.2}\nobstacles:\n" + finger("left", "-") + finger("right", "");
+}
+
+TEST(Failures, ofWhatIsSqueezedNameTheTwoThatSqueeze)
+{
+  const std::string cube = failureOf(fingers(0.051, 0.0496) + R"(
+bodies: [{name: cube, mass: 0.05, gravity: false, shape: {box: {size: [0.03, 0.03, 0.1]}}, pose: {position: [0, 0, 0.06]}}]
+)");
+  EXPECT_NE(cube.find("squeezed: obstacle 'left' and obstacle 'right' leave body 'cube' too little room"),
+            std::string::npos)
+      << cube;
+  EXPECT_NEAR(numberIn(cube, "it needs more than ([0-9.]+) mm between them"), 30, 0.3);
+  EXPECT_LT(numberIn(cube, "they are to be ([0-9.]+) mm apart at the end of the step"), 30.0);
+  const std::string sheet = failureOf(fingers(0.024, 0.0214) + R"(
+gravity: [0, 0, 0]
+cloths:
+  - name: sheet
+    grid: {corner: [0, -0.08, 0.02], sides: [[0, 0.16, 0], [0, 0, 0.08]], cells: [12, 6], pattern: alternating}
+    material: {area_density: 0.2, thickness: 0.0005, youngs_modulus: 1.0e6}
+    contact: {thickness: 0.002, method: barrier}
+)");
+  EXPECT_NE(sheet.find("squeezed: obstacle 'left' and obstacle 'right' leave cloth 'sheet' too little room"),
+            std::string::npos)
+      << sheet;
+  EXPECT_NEAR(numberIn(sheet, "it needs more than ([0-9.]+) mm between them"), 2, 0.1);
+  EXPECT_EQ(sheet.find("pins"), std::string::npos) << sheet;
+}
+
 TEST(Failures, ofAThreadNameTheNodeAndTheNozzle)
 {
   const std::string text = failureOf(R"(

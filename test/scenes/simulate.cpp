@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -143,6 +144,18 @@ TEST_F(Simulate, actsOnLimits)
   const Result released = simulate(cantilever + drawn + " --set limits.on_limit=release");
   EXPECT_EQ(released.status, 0) << released.output;
   EXPECT_NE(released.output.find("' is released (on_limit: release)"), std::string::npos) << released.output;
+}
+
+TEST_F(Simulate, saysOfEachGraspWhyItIsReleased)
+{
+  const std::string output =
+      simulate(cantilever + drawn + " --set 'limits={strain: none, force: 1.0e-3, on_limit: release}'").output;
+  for (const std::string grasp : {"'a'", "'b'"})
+    EXPECT_TRUE(std::regex_search(
+        output, std::regex("warning: grasp " + grasp +
+                           ": its force [0-9.]+ N exceeds limits.force = 0.001 N .*; grasp " + grasp + " is released")))
+        << output;
+  EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 2) << output;
 }
 
 TEST_F(Simulate, badInputIsStatus2)

@@ -316,7 +316,7 @@ TEST(IslandScheduler, NamesWhatCrossesAtTheStart)
   }
   catch (const SceneError& error)
   {
-    EXPECT_NE(std::string(error.what()).find("thread 'syrup' and body 'ball' touch or cross"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("thread 'syrup' and body 'ball' cross by "), std::string::npos)
         << error.what();
   }
 }

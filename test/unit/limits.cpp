@@ -55,7 +55,11 @@ struct WatchedRun
   void take(const std::vector<LimitExcess>& begun)
   {
     all.insert(all.end(), begun.begin(), begun.end());
-    released.insert(released.end(), watch.released().begin(), watch.released().end());
+    for (const LimitWatch::Release& release : watch.released())
+    {
+      released.push_back(release.grasp);
+      EXPECT_NE(release.why.find(" exceeds limits."), std::string::npos) << release.why;
+    }
   }
   double end() const { return simulation.state().rods[0].x(0, 10); }
 

@@ -125,7 +125,8 @@ TEST(ClothReader, NamesWhatIsWrong)
       {"cloths.0.grasps.left={corner: upper_left, attach: frame, motion: {table: [[0, 0, 0, 1]]}}",
        "must be [t, x, y, z, qx, qy, qz, qw]"},
       {"cloths.0.stiff=1", "unknown key"},
-      {"time.integrator=bdf2", "is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler"},
+      {"time.integrator=bdf2",
+       "is not for the cloth of this scene; must be one of: implicit_euler, tr_bdf2, symplectic_euler, imex"},
       {"time.spectral_radius=0.5", "is for generalized_alpha, which cloth does not have"},
       {"wind={velocity: [2000, 0, 0]}", "wind.velocity"},
   };
@@ -140,6 +141,25 @@ TEST(ClothReader, NamesWhatIsWrong)
                                "cloths.0.grasps.left.motion={body: hand}"})
                 .find("is simulated"),
             std::string::npos);
+}
+
+/// What a message offers must be what the scene takes.
+TEST(ClothReader, NamesTheIntegratorsOfTheScene)
+{
+  const std::string body = "bodies=[{name: box, mass: 1, shape: {sphere: {radius: 0.1}}}]",
+                    contact = "cloths.0.contact={}", method = "cloths.0.contact={method: impulses, obstacles: false}";
+  const auto refusal = [&](const std::string& c) {
+    return problemsOf(towel, {body, c, "time.integrator=generalized_alpha"});
+  };
+  EXPECT_NE(refusal(contact).find("is not for the cloth of this scene; must be implicit_euler"), std::string::npos);
+  EXPECT_NE(refusal(method).find("must be one of: implicit_euler, tr_bdf2, symplectic_euler"), std::string::npos);
+  EXPECT_NE(problemsOf(towel, {body, contact, "time.integrator=tr_bdf2"}), "");
+  EXPECT_EQ(problemsOf(towel, {body, method, "time.integrator=tr_bdf2"}), "");
+  const SceneConfig scene = parseScene(towel, "t", {body, contact});
+  ASSERT_FALSE(scene.warnings.empty());
+  EXPECT_NE(scene.warnings[0].find("give time.integrator, which in this scene must be implicit_euler"),
+            std::string::npos)
+      << scene.warnings[0];
 }
 
 class ClothFiles : public ::testing::Test

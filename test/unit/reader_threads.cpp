@@ -242,8 +242,7 @@ TEST(ThreadContactReader, NamesWhatIsWrong)
       {"threads.0.floor.centreline_on_surface=true", "is for floors that the thread sticks to"},
       {"threads.0.contact.obstacles=false", "makes the floor an obstacle"},
       {"contact.gap=0", "contact.gap = 0"},
-      {"threads.1.centerline.straight={from: [-0.05, 0, -0.0145], to: [0.05, 0, -0.0145], edges: 40}",
-       "touch or cross"},
+      {"threads.1.centerline.straight={from: [-0.05, 0, -0.0145], to: [0.05, 0, -0.0145], edges: 40}", " cross by "},
   };
   for (const auto& [assignment, expected] : cases)
     EXPECT_NE(problemsOfTouching(assignment).find(expected), std::string::npos)

@@ -332,6 +332,59 @@ bodies:
   EXPECT_NEAR(load(2, "my [N m]"), (x_ball - 0.2) * ball + (x_box - 0.2) * box, 1e-2);
 }
 
+/// A rope with a ball hangs over an obstacle and a driven body: grasps and both bear its weight.
+TEST(RecordedFields, ContactForcesOfAnEquilibrium)
+{
+  Simulation simulation = simulationOf(R"(
+start: equilibrium
+time: {step: 0.004}
+record: {fields: [contact_force]}
+rods:
+  - name: rope
+    centerline: {straight: {from: [-0.3, 0, 0.2], to: [0.3, 0, 0.2], edges: 60}}
+    cross_section: {radius: 0.004}
+    material: {density: 1100, youngs_modulus: 1.0e6, poissons_ratio: 0.45}
+    contact: {friction: 0}
+    grasps: {l: {edges: [0]}, r: {edges: [-1]}}
+obstacles: [{name: peg, shape: {capsule: {radius: 0.02, length: 0.2}}, pose: {position: [0.12, 0, 0.15], rpy: [1.5707963, 0, 0]}}]
+bodies:
+  - {name: ball, mass: 0.02, shape: {sphere: {radius: 0.02}}, pose: {position: [-0.1, 0, 0.1]}, welds: [{rod: rope, edge: 20}]}
+  - {name: bar, motion: fixed, shape: {capsule: {radius: 0.02, length: 0.2}}, pose: {position: [0.2, 0, 0.165], rpy: [1.5707963, 0, 0]}}
+)");
+  const auto up = [&](std::size_t k) { return column(fieldTablesOf(simulation).at(k), "contact_fz [N]").sum(); };
+  const double weight = 9.81 * (simulation.rodModel(0).totalMass() + 0.02),
+               held = -simulation.grasps().wrench(0).force.z() - simulation.grasps().wrench(1).force.z();
+  EXPECT_EQ(up(1), 0.0);     // the ball touches nothing
+  EXPECT_LT(up(2), -1e-3);   // the bar
+  EXPECT_LT(up(3), -1e-3);   // the peg
+  EXPECT_NEAR(up(0), -up(2) - up(3), 1e-9);
+  EXPECT_NEAR(held + up(0), weight, 1e-5 * weight);
+  runSteps(simulation, 1);   // from where it stands
+  EXPECT_NEAR(held + up(0), weight, 1e-2 * weight);
+}
+
+/// Damping takes nothing of what a floor bears.
+TEST(RecordedFields, ContactForcesOfDampedClothCarryItsWeight)
+{
+  for (const char* damping : {"{}", "{mass: 10}", "{mass: 100}", "{drag: 2}"})
+  {
+    Simulation simulation = simulationOf(R"(
+time: {step: 0.01}
+record: {fields: [contact_force]}
+cloths:
+  - name: sheet
+    grid: {corner: [-0.2, -0.2, 0.0021], sides: [[0.4, 0, 0], [0, 0.4, 0]], cells: 8}
+    material: {area_density: 0.2}
+    contact: {thickness: 0.004, method: impulses}
+obstacles: [{name: floor, shape: {plane: {}}}]
+)",
+                                         {std::string("cloths.0.damping=") + damping});
+    runSteps(simulation, 100);
+    const double weight = 9.81 * simulation.clothModel(0).totalMass();
+    EXPECT_NEAR(column(fieldTablesOf(simulation).at(0), "contact_fz [N]").sum(), weight, 1e-3 * weight) << damping;
+  }
+}
+
 TEST(RecordedFields, AreWrittenOnlyWhenAskedFor)
 {
   const std::string folder = testing::TempDir() + "recorded_fields";

@@ -418,7 +418,20 @@ TEST(Simulation, SaysWhereInTheFileARodCannotBeComposed)
       0u);
   const std::string touching = refusal(
       {"rods.0.contact={}", "rods.1.contact={}", "rods.1.centerline.straight={from: [0.5, -1, 0], to: [0.5, 1, 0]}"});
-  EXPECT_EQ(touching.find("two.yaml: rod 'a' and rod 'b' touch or cross"), 0u) << touching;
+  EXPECT_EQ(touching.find("two.yaml: rod 'a' and rod 'b' cross by "), 0u) << touching;
+  try
+  {
+    Simulation(
+        parseScene("bodies: [{name: ball, mass: 1, shape: {sphere: {radius: 0.1}}, pose: {position: [0, 0, 0.1]}}]\n"
+                   "obstacles: [{name: floor, shape: {plane: {}}}]"));
+    FAIL();
+  }
+  catch (const SceneError& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("body 'ball' and obstacle 'floor' touch as the scene starts"),
+              std::string::npos)
+        << error.what();
+  }
 }
 
 TEST(Simulation, FormulationIsChosenWhereItApplies)

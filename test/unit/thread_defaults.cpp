@@ -343,7 +343,7 @@ obstacles:
   }
   catch (const SceneError& error)
   {
-    EXPECT_TRUE(contains(error.what(), "thread 'honey' and obstacle 'table' touch or cross")) << error.what();
+    EXPECT_TRUE(contains(error.what(), "thread 'honey' and obstacle 'table' cross by ")) << error.what();
   }
 }
 

@@ -36,6 +36,7 @@ struct Stage
 /// a_fraction.
 struct StepPlan
 {
+  Integrator integrator = Integrator::implicit_euler;
   std::vector<Stage> stages;
   double fraction = 1.0, a_fraction = 1.0;
   bool needs_acceleration = false;   ///< of the start of the step

@@ -62,7 +62,7 @@ struct StepReport
   double tracking_error = 0.0;
   /// averages of tracked cloths whose forces are at their bounds, and which are therefore not met
   int forces_at_bound = 0;
-  double error_estimate = 0.0;   ///< adaptive steps only: estimated local error [m]
+  double error_estimate = 0.0;   ///< estimated local error [m]; 0: nothing asks for it
   long work = 0;                 ///< cloth: what the step did, in counts of a WorkBudget
 
   /// Takes the other report into this one (sums, maxima, first failure wins).

@@ -113,6 +113,8 @@ public:
   virtual double addGradient(const double* x, double* gradient) const = 0;
   /// Adds D to the values of the matrix of setPattern().
   virtual void addHessian(double* values) const = 0;
+  /// D of a point [N/m]; 0 before the first stage.
+  virtual const Eigen::Matrix3d& stiffness(int point) const = 0;
   /// Returns the work of the potential on the points that are not held, on the way between two configurations [J].
   virtual double work(const PointVector& from, const PointVector& to, const std::vector<char>& held) const = 0;
 

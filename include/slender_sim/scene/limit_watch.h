@@ -41,8 +41,14 @@ public:
   /// Checks strains, forces and torques. Call it after a step. Returns the excursions that begin.
   std::vector<LimitExcess> checkStep();
 
-  /// Returns the grasps that the last check released (`on_limit: release`).
-  const std::vector<int>& released() const { return released_; }
+  /// A grasp, and the text of the excess because of which `on_limit: release` released it.
+  struct Release
+  {
+    int grasp;
+    std::string why;
+  };
+  /// Returns what the last check released.
+  const std::vector<Release>& released() const { return released_; }
   /// Returns the reason why the simulation must stop (`on_limit: stop`); otherwise empty.
   const std::string& stopped() const { return stopped_; }
   /// Returns the reason why inputs are held (`on_limit: hold`); otherwise empty.
@@ -82,7 +88,7 @@ private:
   std::vector<double> rod_strain_limits_;
   double cloth_strain_limit_ = kSoftStrain;
   std::map<Key, Excursion> excursions_;
-  std::vector<int> released_;
+  std::vector<Release> released_;
   std::string stopped_, held_;
   std::uint64_t count_ = 0;
 };

@@ -1,6 +1,7 @@
 // Chooses the integrator of a scene, and reports options of time that its objects do not support.
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "read_parts.h"
 
@@ -8,9 +9,70 @@ namespace slender {
 
 namespace {
 
+bool hasContact(const RodConfig& rod) { return rod.contact.has_value(); }
+
+/// Whether a simulated body has a shape that may hit something.
+bool hitsSomething(const SceneConfig& scene, const BodyConfig& body)
+{
+  return body.isSimulatedSolid() &&
+         (!scene.obstacles.empty() ||
+          std::any_of(scene.threads.begin(), scene.threads.end(),
+                      [](const ThreadConfig& thread) { return thread.contact.has_value(); }) ||
+          std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                      [&](const BodyConfig& other) { return &other != &body && other.isSolid(); }));
+}
+
+/// Whether a rod or a simulated body of the scene may hit something.
+bool touchesSomething(const SceneConfig& scene)
+{
+  return std::any_of(scene.rods.begin(), scene.rods.end(), hasContact) ||
+         std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                     [&](const BodyConfig& body) { return hitsSomething(scene, body); });
+}
+
+/// Whether an object of the scene takes no other steps than those of implicit Euler.
+bool takesImplicitEulerAlone(const SceneConfig& scene)
+{
+  const auto any = [](const auto& objects, const auto& is) { return std::any_of(objects.begin(), objects.end(), is); };
+  return any(scene.rods, [](const RodConfig& rod) { return rod.tracking != nullptr; }) ||
+         any(scene.cloths,
+             [](const ClothConfig& cloth) {
+               return cloth.tracking || (cloth.contact && cloth.contact->method == ContactMethod::barrier);
+             }) ||
+         (touchesSomething(scene) &&
+          any(scene.threads, [](const ThreadConfig& thread) { return thread.contact.has_value(); }));
+}
+
+/// The integrators that all objects of a scene with rods, bodies or cloth take.
+std::vector<std::string> integratorsFor(const SceneConfig& scene)
+{
+  std::vector<std::string> words = {"implicit_euler"};
+  if (takesImplicitEulerAlone(scene))
+    return words;
+  const bool touches = touchesSomething(scene), cloth = !scene.cloths.empty();
+  if (!cloth)
+    words.push_back("bdf2");
+  words.push_back("tr_bdf2");
+  if (!cloth && !touches)
+    words.insert(words.end(), {"implicit_midpoint", "generalized_alpha"});
+  if (!touches)
+    words.push_back("symplectic_euler");
+  if (scene.rods.empty() && scene.threads.empty() && scene.bodies.empty())
+    words.push_back("imex");
+  return words;
+}
+
+/// "must be one of: ...", for messages about the integrator.
+std::string mustBe(const SceneConfig& scene)
+{
+  const std::vector<std::string> words = integratorsFor(scene);
+  return (words.size() > 1 ? "must be one of: " : "must be ") + joinWords(words);
+}
+
 void checkClothTime(YamlMap& map, SceneConfig& scene)
 {
   const YamlCursor time = map.find("time");
+  const std::vector<std::string> taken = integratorsFor(scene);
   if (!time.find("integrator").present())
   {
     if (scene.time.integrator != Integrator::implicit_euler && !(scene.rods.empty() && scene.bodies.empty()))
@@ -19,15 +81,14 @@ void checkClothTime(YamlMap& map, SceneConfig& scene)
           .warning(
               "makes implicit_euler the default integrator of the rods and bodies as well, which is of first order; "
               "without cloth it is " +
-              std::string(toString(scene.time.integrator)) +
-              ": give time.integrator to choose (cloth takes implicit_euler or tr_bdf2)");
+              std::string(toString(scene.time.integrator)) + ": give time.integrator, which in this scene " +
+              mustBe(scene));
     }
     scene.time.integrator = Integrator::implicit_euler;
   }
-  else if (scene.time.integrator != Integrator::implicit_euler && scene.time.integrator != Integrator::tr_bdf2 &&
-           scene.time.integrator != Integrator::imex && scene.time.integrator != Integrator::symplectic_euler)
+  else if (std::find(taken.begin(), taken.end(), toString(scene.time.integrator)) == taken.end())
   {
-    time.find("integrator").problem("is not for cloth; must be implicit_euler, tr_bdf2, imex or symplectic_euler");
+    time.find("integrator").problem("is not for the cloth of this scene; " + mustBe(scene));
   }
   if (time.find("spectral_radius").present())
     time.find("spectral_radius").problem("is for generalized_alpha, which cloth does not have; leave it out");
@@ -94,49 +155,36 @@ void checkTrackedTime(YamlMap& map, SceneConfig& scene)
     map.find("start").problem("is not for rods that track a guide; must be as_given");
 }
 
-bool touchesSomething(const RodConfig& rod) { return rod.contact.has_value(); }
-
-/// Whether a simulated body has a shape that may hit something.
-bool hitsSomething(const SceneConfig& scene, const BodyConfig& body)
-{
-  return body.isSimulatedSolid() &&
-         (!scene.obstacles.empty() ||
-          std::any_of(scene.threads.begin(), scene.threads.end(),
-                      [](const ThreadConfig& thread) { return thread.contact.has_value(); }) ||
-          std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                      [&](const BodyConfig& other) { return &other != &body && other.isSolid(); }));
-}
-
 /// The integrator of rods and bodies that touch something.
 void checkContactTime(const YamlCursor& time, SceneConfig& scene)
 {
-  const auto hits = [&](const BodyConfig& body) { return hitsSomething(scene, body); };
-  const bool touches = std::any_of(scene.rods.begin(), scene.rods.end(), touchesSomething) ||
-                       std::any_of(scene.bodies.begin(), scene.bodies.end(), hits);
+  const bool touches = touchesSomething(scene);
   if (touches && !time.find("integrator").present())
   {
     // methods of second order carry an impact's velocity on and bounce
     scene.time.integrator = Integrator::implicit_euler;
-    const bool changed = !std::all_of(scene.rods.begin(), scene.rods.end(), touchesSomething);
+    const bool changed = !std::all_of(scene.rods.begin(), scene.rods.end(), hasContact);
     if (changed)
       scene.notes.push_back(
           "contact makes implicit_euler the default integrator of the whole scene, also of rods without contact; give "
           "time.integrator to choose");
   }
-  else if (touches && scene.time.integrator != Integrator::implicit_euler &&
-           scene.time.integrator != Integrator::symplectic_euler)
+  else if (touches && (scene.time.integrator == Integrator::bdf2 || scene.time.integrator == Integrator::tr_bdf2))
   {
     time.find("integrator")
         .warning(
             "of second order carries the velocity before an impact beyond it, so that a rod or body may bounce higher "
             "than it fell: use implicit_euler, the default with contact, where something is hit");
   }
-  if (touches && scene.time.integrator == Integrator::symplectic_euler)
+  const bool ends_ahead =
+      scene.time.integrator == Integrator::implicit_midpoint || scene.time.integrator == Integrator::generalized_alpha;
+  if (touches && (ends_ahead || scene.time.integrator == Integrator::symplectic_euler))
   {
     time.find("integrator")
-        .problem(
-            "takes no contact, whose forces are too stiff for explicit steps; must be implicit_euler, bdf2 or tr_bdf2, "
-            "or nothing may have contact (bodies: contact: false)");
+        .problem(std::string("takes no contact, ") +
+                 (ends_ahead ? "because its steps end beyond where contact keeps surfaces apart"
+                             : "whose forces are too stiff for explicit steps") +
+                 "; " + mustBe(scene) + ", or nothing may have contact (bodies: contact: false)");
   }
 }
 
@@ -151,11 +199,8 @@ void chooseIntegrator(YamlMap& map, const YamlCursor& time, SceneConfig& scene)
     checkThreadTime(map, scene);
   if (!scene.cloths.empty())
     checkClothTime(map, scene);
-  if (scene.time.integrator == Integrator::imex &&
-      !(scene.rods.empty() && scene.threads.empty() && scene.bodies.empty()))
-  {
-    time.find("integrator").problem("is for cloth only; must be another one in scenes with rods, threads or bodies");
-  }
+  else if (scene.time.integrator == Integrator::imex && !(scene.rods.empty() && scene.bodies.empty()))
+    time.find("integrator").problem("is for cloth only; " + mustBe(scene));
 }
 
 }   // namespace slender

@@ -96,7 +96,7 @@ std::optional<WeldConfig> readWeld(const YamlCursor& at, const std::vector<RodCo
     std::vector<std::string> names;
     for (const RodConfig& rod : rods)
       names.push_back(rod.name);
-    return at_rod.problem("is no rod of the scene" + didYouMean(*name, names) + "; it has: " + joinWords(names, 10));
+    return at_rod.problem("is no rod of the scene" + didYouMean(*name, names) + itHas(names));
   }
   const int edges = found->edges;
   // no edges: reported where the rod is

@@ -117,8 +117,7 @@ int findRecorded(const YamlCursor& at, const std::string& name, const Recorded& 
   }
   if (found == all.names.end())
   {
-    at.problem("is no rod or cloth of the scene" + didYouMean(name, all.names) +
-               "; it has: " + joinWords(all.names, 10));
+    at.problem("is no rod or cloth of the scene" + didYouMean(name, all.names) + itHas(all.names));
     return -1;
   }
   if (std::find(found + 1, all.names.end(), name) != all.names.end())

@@ -93,6 +93,11 @@ std::string joinWords(const std::vector<std::string>& words, std::size_t most)
   return text;
 }
 
+std::string itHas(const std::vector<std::string>& names)
+{
+  return names.empty() ? ", which has none" : "; it has: " + joinWords(names, 10);
+}
+
 std::string trimmed(const std::string& text)
 {
   const char* const blank = " \t\r\n";

@@ -307,6 +307,8 @@ std::string didYouMean(const std::string& word, const std::vector<std::string>& 
 /// The first words with commas between them, at most so many.
 std::string joinWords(const std::vector<std::string>& words,
                       std::size_t most = std::numeric_limits<std::size_t>::max());
+/// "; it has: a, b", for messages about a name that is not among these; at most ten of them.
+std::string itHas(const std::vector<std::string>& names);
 /// The text without blanks at its ends.
 std::string trimmed(const std::string& text);
 

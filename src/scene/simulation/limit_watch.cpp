@@ -111,7 +111,7 @@ void LimitWatch::act(Excursion& excursion)
         if (!simulation_.grasps().isActive(grasp))
           continue;
         simulation_.grasps().release(grasp);
-        released_.push_back(grasp);
+        released_.push_back({grasp, why});
       }
   }
 }
