@@ -55,8 +55,8 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
 
 double ClothStepper::Impl::inertia(int vertex, double h) const
 {
-  double air = 0.0;   // explicit steps leave it 0
-  if (!averages)      // whose factors must last from step to step
+  double air = 0.0;   // Explicit steps leave it 0.
+  if (!averages)      // Factors of averages must last from step to step.
     for (const auto& load : system->loads())
       air += h * h * load->stiffness(vertex).norm();
   const double damping = options.integrator == Integrator::symplectic_euler ? 0.0 : h * model->mass_damping;

@@ -63,16 +63,16 @@ void BarrierStiffness::adapt(const Barrier& barrier)
   constexpr double kLarge = 0.5;   // share of a layer
   constexpr double kStill = 0.02, kGrowth = 1.2;
   const double aim = largest_force_ / barrier.force(barrier.c / 5);
-  if (isTooSmall() && shrinks())
-    raise(share_, aim);
   while (law_.count() > 1 && share_ >= innermost().share)
     innermost() = {0.0, 0.0};
+  if (isTooSmall() && shrinks())
+    raise(share_, aim);
   BarrierLayer& outer = law_.layers[0];
   if (share_ >= outer.share)
     outer.share = std::min(share_, 1.0);
   else if (law_.count() == 1 && share_ > kLarge * outer.share)
     outer.stiffness = std::max(0.8 * outer.stiffness, std::min(outer.stiffness, aim));
-  else if (law_.count() > 1 && std::abs(share_ - share_begin_) < kStill * share_begin_)
+  else if (share_ * kLeastGap < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
     outer.stiffness = std::clamp(aim, outer.stiffness, kGrowth * outer.stiffness);
   bound();
 }

@@ -318,7 +318,7 @@ void ObjectIsland::blameSolids(StepReport& report)
   const std::vector<IslandSolid>& solids = island_.equations().solids;
   const std::vector<Pose>& now = island_.equations().startSolids();
   ContactPotential& potential = *island_.equations().contact();
-  potential.setSprings({});   // without friction
+  potential.setSprings({});   // Then nothing has friction where the step begins.
   potential.begin(island_.equations().startPoints(), now, world_.time.step);
   potential.evaluate(island_.equations().startPoints(), now, false);
   for (const ContactTerm& term : potential.terms())

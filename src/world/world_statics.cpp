@@ -233,7 +233,7 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
   if (settle(time_.step))
   {
     settleStably(true);
-    load();   // a search for a way down from a saddle leaves contacts of other places
+    load();   // The search for a way down from a saddle leaves contacts of other places.
     report_.message.clear();
     copy(work_, state);
     for (const RodObject& rod : objects_.rods)
