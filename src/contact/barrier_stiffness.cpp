@@ -56,12 +56,14 @@ bool BarrierStiffness::beginStep()
 }
 
 /// A layer that nothing is in goes. The outermost one grows up to the nearest surface, and becomes softer while loads
-/// are small: slowly, because a load that comes back should find no soft barrier. Under a load that stays, it slowly
-/// becomes as stiff as the load needs, so that inner layers, which are harder to solve, are not needed for long.
-void BarrierStiffness::adapt(const Barrier& barrier)
+/// are small: slowly, because a load that comes back should find no soft barrier. Under a load that stays, it becomes
+/// as stiff as the load needs, so that inner layers, which are harder to solve, are not needed for long. This takes
+/// tenths of seconds, so that it adds little energy while a collision turns round.
+void BarrierStiffness::adapt(const Barrier& barrier, double h)
 {
-  constexpr double kLarge = 0.5;   // share of a layer
-  constexpr double kStill = 0.02, kGrowth = 1.2;
+  constexpr double kLarge = 0.5;                     // share of a layer
+  constexpr double kStill = 0.02;                    // change of the smallest gap
+  constexpr double kRate = 5.0, kMostGrowth = 0.2;   // [1/s], and in a step
   const double aim = largest_force_ / barrier.force(barrier.c / 5);
   while (law_.count() > 1 && share_ >= innermost().share)
     innermost() = {0.0, 0.0};
@@ -73,7 +75,7 @@ void BarrierStiffness::adapt(const Barrier& barrier)
   else if (law_.count() == 1 && share_ > kLarge * outer.share)
     outer.stiffness = std::max(0.8 * outer.stiffness, std::min(outer.stiffness, aim));
   else if (share_ * kLeastGap < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
-    outer.stiffness = std::clamp(aim, outer.stiffness, kGrowth * outer.stiffness);
+    outer.stiffness = std::clamp(aim, outer.stiffness, (1.0 + std::min(kRate * h, kMostGrowth)) * outer.stiffness);
   bound();
 }
 

@@ -31,7 +31,7 @@ public:
   bool beginStep();
   void beginSolution() { share_before_ = share_; }   ///< likewise
   /// See ContactPotential::adaptStiffness() and stiffen().
-  void adapt(const Barrier& barrier);
+  void adapt(const Barrier& barrier, double h);
   bool stiffen(const Barrier& barrier, bool converged);
 
 private:

@@ -414,10 +414,10 @@ void ContactPotential::setStiffness(double force)
     setBarrier(static_cast<int>(object), {{{{1.0, force}, {}, {}}}});
 }
 
-void ContactPotential::adaptStiffness()
+void ContactPotential::adaptStiffness(double h)
 {
   for (BarrierStiffness& own : stiffness_)
-    own.adapt(barrier_);
+    own.adapt(barrier_, h);
 }
 
 void ContactPotential::beginSolution()

@@ -146,15 +146,15 @@ public:
   /// share and the larger stiffness of the two, and the inner layers of both act. Between an object and a solid, the
   /// outermost layer is no softer than ContactSolid::least_stiffness. A barrier that was not chosen yet begins at the
   /// smallest gap of the object in begin(), so that nothing is thrown from where it stands.
-  /// adaptStiffness(), after a step, follows the largest normal force on each object in the last evaluate(): it aims at
-  /// a smallest gap of a fifth and acts outside a twelfth to a half of the innermost layer. It makes the barrier
-  /// stiffer only where stiffen() would.
+  /// adaptStiffness(), after a step of h seconds, follows the largest normal force on each object in the last
+  /// evaluate(): it aims at a smallest gap of a fifth and acts outside a twelfth to a half of the innermost layer. It
+  /// makes the barrier stiffer only where stiffen() would.
   const BarrierLaw& barrier(int object) const { return stiffness_[object].law(); }
   /// The stiffness of the outermost layer is bounded by the range, which holds until the next call, and whose least
   /// value is at least ContactOptions::least_stiffness.
   void setBarrier(int object, const BarrierLaw& barrier, const BarrierRange& range = {});
   void setStiffness(double force);   ///< of barriers of one layer about all objects [N]
-  void adaptStiffness();
+  void adaptStiffness(double h);
   /// Makes the barrier stiffer about objects whose smallest gap is too small to be resolved: it is below a twelfth of
   /// the innermost layer and has shrunk since begin(), or it is below a fiftieth. If surfaces were inside this layer at
   /// begin(), a new layer begins at their smallest gap then. If the last solution has `converged`, the stiffness

@@ -33,7 +33,7 @@ TEST(ContactAllocations, WarmContactMakesNone)
     potential.lagFriction();
     potential.evaluate(there, solids, true);
     terms = potential.terms().size();
-    potential.adaptStiffness();
+    potential.adaptStiffness(1e-3);
     potential.clearance(back, solids);
   };
   for (int k = 0; k < 3; ++k)
@@ -74,7 +74,7 @@ TEST(ContactAllocations, WarmContactOfSheetsMakesNone)
     potential.lagFriction();
     potential.evaluate(there, solids, true);
     terms = potential.terms().size();
-    potential.adaptStiffness();
+    potential.adaptStiffness(1e-3);
   };
   for (int k = 0; k < 3; ++k)
     step();

@@ -133,7 +133,7 @@ TEST(ContactEnergy, AStifferBarrierBeginsAtTheSmallestGap)
     EXPECT_NEAR(sum, slope, 1e-5 * slope) << gap;
   }
   energyAt(0.5e-3);
-  potential.adaptStiffness();   // Nothing is in the inner layer.
+  potential.adaptStiffness(1e-3);   // Nothing is in the inner layer.
   EXPECT_EQ(potential.barrier(0).count(), 1);
 }
 

@@ -122,7 +122,7 @@ TEST(ContactPotential, AdaptsItsStiffnessToTheLoad)
           force = std::max(force, term.force.norm());
         (force > load ? low : high) = gap;
       }
-      potential.adaptStiffness();
+      potential.adaptStiffness(1.0);
       potential.begin(at(gap), {Pose{}}, 0.01);
     }
     EXPECT_GE(potential.barrier(0).layers[0].stiffness, options.least_stiffness);
