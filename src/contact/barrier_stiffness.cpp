@@ -7,8 +7,8 @@ namespace slender {
 
 namespace {
 
-constexpr double kLeastGap = 12.0;     // the gap over the smallest that barriers are to be resolved in
-constexpr double kLeastShare = 0.01;   // of the gap, where layers begin: thinner ones would be hard to solve
+constexpr double kLeastGap = 12.0;     // A layer over the gap below which the barrier is made stiffer.
+constexpr double kLeastShare = 1e-5;   // of the gap, where layers begin: thinner ones would be lost in rounding errors
 
 }   // namespace
 
@@ -55,10 +55,10 @@ bool BarrierStiffness::beginStep()
   return begins_inside;
 }
 
-/// A layer that nothing is in goes. The outermost one grows up to the nearest surface, and becomes softer while loads
-/// are small: slowly, because a load that comes back should find no soft barrier. Under a load that stays, it becomes
-/// as stiff as the load needs, so that inner layers, which are harder to solve, are not needed for long. This takes
-/// tenths of seconds, so that it adds little energy while a collision turns round.
+/// An inner layer without a gap inside is removed. The outermost layer grows up to the nearest surface. A layer becomes
+/// softer while loads on it are small, but slowly, because loads come back. Under a load that stays, the outermost
+/// layer becomes as stiff as the load needs, so that inner layers, which are harder to solve, are not needed for long.
+/// This takes tenths of seconds, so that it adds little energy while a collision turns round.
 void BarrierStiffness::adapt(const Barrier& barrier, double h)
 {
   constexpr double kLarge = 0.5;                     // share of a layer
@@ -72,9 +72,9 @@ void BarrierStiffness::adapt(const Barrier& barrier, double h)
   BarrierLayer& outer = law_.layers[0];
   if (share_ >= outer.share)
     outer.share = std::min(share_, 1.0);
-  else if (law_.count() == 1 && share_ > kLarge * outer.share)
-    outer.stiffness = std::max(0.8 * outer.stiffness, std::min(outer.stiffness, aim));
-  else if (share_ * kLeastGap < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
+  else if (share_ > kLarge * innermost().share)
+    innermost().stiffness = std::max(0.8 * innermost().stiffness, std::min(innermost().stiffness, aim));
+  if (share_ * kLeastGap < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
     outer.stiffness = std::clamp(aim, outer.stiffness, (1.0 + std::min(kRate * h, kMostGrowth)) * outer.stiffness);
   bound();
 }
@@ -88,14 +88,16 @@ bool BarrierStiffness::shrinks() const
   return !narrow_ && (share_ < kLess * share_begin_ || share_ < kTiny * law_.innermost().share);
 }
 
-/// `share`: of the smallest gap for which forces may not change.
+/// Makes the barrier stiffer for gaps below this share alone. If no layer can be added and gaps are inside the
+/// innermost one, nothing changes. A new layer is so stiff that it can take more energy than the thicker one around it.
 void BarrierStiffness::raise(double share, double stiffness)
 {
+  constexpr double kStiffer = 100.0;   // Its share may be a twelfth.
   const int count = law_.count();
-  if (share < innermost().share && kLeastShare < innermost().share && count < BarrierLaw::kMost)
-    law_.layers[static_cast<std::size_t>(count)] = {std::max(share, kLeastShare), stiffness};
-  else
+  if (share >= innermost().share)
     innermost().stiffness = stiffness;
+  else if (share > kLeastShare && count < BarrierLaw::kMost)
+    law_.layers[static_cast<std::size_t>(count)] = {share, std::max(stiffness, kStiffer * innermost().stiffness)};
 }
 
 bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)

@@ -10,9 +10,9 @@ namespace slender {
 /// The barrier about one object, which follows the forces on this object. What touches other objects of the island does
 /// not change it.
 ///
-/// A barrier never becomes stiffer where a gap is already inside it, because that would be energy from nowhere.
-/// Instead, a stiffer layer is added that begins at the smallest gap that there is. As long as the object stays
-/// pressed, forces so remain a fixed function of gaps. Layers that nothing is in are taken away.
+/// A barrier that becomes stiffer while gaps are inside it makes energy. Instead, a stiffer layer is added that begins
+/// at the smallest gap that there is. Forces remain the same function of gaps while the object is pressed, except under
+/// loads that stay, see adapt(). Inner layers without a gap inside are removed.
 class BarrierStiffness
 {
 public:
@@ -22,8 +22,8 @@ public:
 
   // ---- the contacts of an evaluation
   void restart();
-  /// A contact of the object: the normal force [N], the stiffness of its innermost layer [N], and the gap over the one
-  /// at which the pair repels.
+  /// A pair of the object within the gap: the normal force [N], the largest stiffness of the layers that act [N], and
+  /// the ratio of its gap to the one at which the pair repels.
   void take(double force, double stiffness, double share);
 
   /// The last evaluation was where a step begins. Returns true if the law was not chosen before, and now begins at the
@@ -45,7 +45,7 @@ private:
   BarrierRange range_;
   double largest_force_ = 0.0;                                      ///< of the last evaluation [N]
   double share_ = std::numeric_limits<double>::infinity();          ///< smallest gap over that which repels
-  double stiffness_there_ = 0.0;                                    ///< of the innermost layer of this smallest gap
+  double stiffness_there_ = 0.0;                                    ///< the largest one that acts at this smallest gap
   double share_begin_ = std::numeric_limits<double>::infinity();    ///< share_ at beginStep()
   double share_before_ = std::numeric_limits<double>::infinity();   ///< share_ at beginSolution()
   bool is_new_ = true;                                              ///< The law was not chosen before this step.

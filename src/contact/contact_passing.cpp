@@ -36,7 +36,7 @@ double ContactPotential::depthOfPassing(int object, int solid) const
 }
 
 /// Whether a piece of an object crosses the core of a solid. The triangles of a mesh have no core: a piece may get into
-/// them as deep as it is thick.
+/// them less deep than it is thick.
 bool ContactPotential::crossesCore(const SurfaceMotion& motion, const int* corner, int corners, int object, int solid,
                                    int piece, double radius) const
 {

@@ -148,6 +148,7 @@ void ContactPotential::Batch::clear()
   measures.clear();
   terms.clear();
   rows.clear();
+  near.clear();
   meet = false;
 }
 
@@ -157,6 +158,7 @@ void ContactPotential::Batch::append(const Batch& other)
   measures.insert(measures.end(), other.measures.begin(), other.measures.end());
   terms.insert(terms.end(), other.terms.begin(), other.terms.end());
   rows.insert(rows.end(), other.rows.begin(), other.rows.end());
+  near.insert(near.end(), other.near.begin(), other.near.end());
   meet = meet || other.meet;
 }
 
@@ -198,6 +200,10 @@ double ContactPotential::evaluate(const Eigen::Matrix3Xd& x, const std::vector<P
       if (object >= 0)
         stiffness_[object].take(m.force, m.stiffness, m.share);
   }
+  for (const Near& pair : found_.near)
+    for (const int object : {pair.object, pair.other})
+      if (object >= 0)
+        stiffness_[object].take(0.0, 0.0, pair.share);
   return energy + addFriction(place, turns);
 }
 
@@ -285,8 +291,12 @@ bool ContactPotential::addContact(const Place& place, const PairGap& gap, Contac
     curvature += layer.stiffness * barrier_.stiffness(g) / range;
     innermost = std::max(innermost, layer.stiffness);
   }
+  const double share = gap.gap / scale / options_.gap;
   if (innermost == 0.0)
+  {
+    out.near.push_back({contact.object, contact.other, share});
     return true;
+  }
   if (!std::isfinite(energy))
     return false;
   copyFour(contact.weight, gap.place);
@@ -304,7 +314,7 @@ bool ContactPotential::addContact(const Place& place, const PairGap& gap, Contac
     addMotion(gap, contact, force, out);
   }
   out.contacts.push_back(contact);
-  out.measures.push_back({energy, gap.gap, gap.gap / scale / options_.gap, force * gap.weight, innermost});
+  out.measures.push_back({energy, gap.gap, share, force * gap.weight, innermost});
   return true;
 }
 
@@ -401,9 +411,10 @@ void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vec
 void ContactPotential::setBarrier(int object, const BarrierLaw& barrier, const BarrierRange& range)
 {
   for (const BarrierLayer& layer : barrier.layers)
-    if (!(layer.stiffness >= 0.0) || !std::isfinite(layer.stiffness))
-      throw std::invalid_argument("contact: stiffness is " + std::to_string(layer.stiffness) +
-                                  " N; must be finite and not negative");
+    if (!(layer.stiffness >= 0.0 && layer.share >= 0.0 && layer.share <= 1.0) || !std::isfinite(layer.stiffness))
+      throw std::invalid_argument("contact: stiffness is " + std::to_string(layer.stiffness) + " N, its share " +
+                                  std::to_string(layer.share) +
+                                  "; must be finite and not negative, and the share in [0, 1]");
   stiffness_[object].set(
       barrier, {std::max(range.least, options_.least_stiffness), std::max(range.most, options_.least_stiffness)});
 }
@@ -411,7 +422,7 @@ void ContactPotential::setBarrier(int object, const BarrierLaw& barrier, const B
 void ContactPotential::setStiffness(double force)
 {
   for (std::size_t object = 0; object < stiffness_.size(); ++object)
-    setBarrier(static_cast<int>(object), {{{{1.0, force}, {}, {}}}});
+    setBarrier(static_cast<int>(object), {{{{1.0, force}, {}, {}, {}, {}}}});
 }
 
 void ContactPotential::adaptStiffness(double h)

@@ -198,6 +198,12 @@ private:
     double gap, share;         ///< the gap [m], and its ratio to the gap at which the pair repels
     double force, stiffness;   ///< normal force, and stiffness of the barrier [N]
   };
+  /// Two objects (`other` is -1 for a solid) that are within the gap, and the ratio of their distance to it.
+  struct Near
+  {
+    int object, other;
+    double share;
+  };
   /// The contacts of a range of candidates, in the order of the candidates.
   struct Batch
   {
@@ -205,7 +211,8 @@ private:
     std::vector<Measure> measures;   ///< of each contact
     std::vector<ContactTerm> terms;
     std::vector<ContactRow> rows;
-    bool meet = false;   ///< The surfaces of one candidate meet.
+    std::vector<Near> near;   ///< pairs that do not repel each other
+    bool meet = false;        ///< The surfaces of one candidate meet.
     void clear();
     void append(const Batch& other);
   };

@@ -216,6 +216,8 @@ StepFailure Island::solveSubstep(const Substep& substep, StepReport& report)
     if (ContactPotential* contact = equations_.contact())
     {
       equations_.endStage();
+      if (substep.may_halve && contact->passedThrough(equations_.startPoints(), equations_.startSolids()))
+        return StepFailure::passed_through;
       if (plan_.fraction == 1.0)
         contact->keepSprings(equations_.startSolids());
     }
@@ -306,9 +308,6 @@ StepFailure Island::attempt(const Substep& substep, StepReport& report)
       isExplicit(time_.integrator) ? stepExplicitly(substep, report) : solveSubstep(substep, report);
   if (solved != StepFailure::none)
     return solved;
-  if (ContactPotential* contact = equations_.contact();
-      contact && substep.may_halve && contact->passedThrough(equations_.startPoints(), equations_.startSolids()))
-    return StepFailure::passed_through;
   if (conserving_ && energyAtEnd() > most_energy_)
     return StepFailure::energy_grew;
   if (ContactPotential* contact = equations_.contact())

@@ -407,10 +407,13 @@ void ObjectIsland::end(WorldState& state) const
     return;
   for (const WorldObject* object : objects_)
     object->contact(state).barrier = {};
-  forParts([&](const WorldObject& object, std::size_t part) {   // An object of several parts keeps the stiffest one.
+  forParts([&](const WorldObject& object, std::size_t part) {   // Several strands keep the stiffest outermost layer.
     BarrierLaw& barrier = object.contact(state).barrier;
-    if (island_.barrier(part).layers[0].stiffness > barrier.layers[0].stiffness)
-      barrier = island_.barrier(part);
+    const BarrierLaw& own = island_.barrier(part);
+    if (barrier.layers[0].stiffness == 0.0)
+      barrier = own;
+    else
+      barrier = {{{{1.0, std::max(own.layers[0].stiffness, barrier.layers[0].stiffness)}, {}, {}, {}, {}}}};
   });
   giveSprings(state);
 }

@@ -24,6 +24,7 @@ TEST(ContactAllocations, WarmContactMakesNone)
   ContactOptions options;
   options.gap = 4e-3;
   ContactPotential potential(surface, options);
+  potential.setStiffness(1.0);
   std::size_t terms = 0;
   const Matrix3Xd there = x.colwise() + Vector3d(5e-2, 1e-4, 0), back = x;
   const auto step = [&] {   // far enough for new candidates
@@ -63,6 +64,7 @@ TEST(ContactAllocations, WarmContactOfSheetsMakesNone)
   ContactOptions options;
   options.gap = 1e-3;
   ContactPotential potential(surface, options);
+  potential.setStiffness(1.0);
   std::size_t terms = 0;
   const Matrix3Xd there = x.colwise() + Vector3d(1e-3, 2e-3, 1e-4);
   const auto step = [&] {   // far enough for new candidates; also with pieces as of threads, which change

@@ -33,7 +33,8 @@ std::string bytesOf(const WorldState& s)
   for (const ThreadGroupState& thread : s.threads)
     bytes += stateBytes(thread);
   for (const slender::ContactMemory& memory : s.contact.threads)
-    bytes += std::to_string(memory.barrier.layers[0].stiffness);
+    for (const BarrierLayer& layer : memory.barrier.layers)
+      bytes += std::to_string(layer.share) + std::to_string(layer.stiffness);
   for (const ClothState& cloth : s.cloths)
     bytes += stateBytes(cloth);
   if (s.rods.empty())

@@ -250,7 +250,7 @@ TEST(MotionShares, ThreadsDoNotChangeContact)
   ASSERT_GT(one.terms().size(), 2000u);   // more than one batch, with friction
   ASSERT_EQ(one.terms().size(), many.terms().size());
   ASSERT_EQ(one.smallestGap(), many.smallestGap());
-  ASSERT_EQ(one.barrier(7).layers[0].stiffness, many.barrier(7).layers[0].stiffness);
+  ASSERT_TRUE(one.barrier(7) == many.barrier(7));
   for (std::size_t i = 0; i < one.terms().size(); ++i)
   {
     ASSERT_EQ(one.terms()[i].force, many.terms()[i].force) << i;

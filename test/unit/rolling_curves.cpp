@@ -100,7 +100,7 @@ TEST(RollingCurves, LeversReachFromOneCentrelineToTheOther)
   EXPECT_EQ(found, 1);
 }
 
-/// A rod between two grasps, under a box that is dragged across it.
+/// A rod between two grasps, under a box that comes down onto it and is then dragged across it.
 TEST(RollingCurves, GraspsFeelTheTorqueOfWhatIsRubbed)
 {
   const std::string scene =
@@ -109,9 +109,10 @@ TEST(RollingCurves, GraspsFeelTheTorqueOfWhatIsRubbed)
       "cross_section: {radius: 0.005}, material: {density: 1000, youngs_modulus: 1e9, poissons_ratio: 0.3}, "
       "grasps: {left: {edges: [0]}, right: {edges: [-1]}}, contact: {friction: 0.4}}]\n"
       "obstacles: [{name: box, shape: {box: {size: [0.2, 0.04, 0.02]}}, friction: 0.4, "
-      "motion: {table: [[0, 0, 0, 0.01508, 0, 0, 0, 1], [1, 0.05, 0, 0.01508, 0, 0, 0, 1]]}}]\n";
+      "motion: {table: [[0, 0, 0, 0.0153, 0, 0, 0, 1], [0.1, 0, 0, 0.01508, 0, 0, 0, 1], [1.1, 0.05, 0, 0.01508, 0, "
+      "0, 0, 1]]}}]\n";
   Simulation s(parseScene(scene));
-  for (int k = 0; k < 100; ++k)
+  for (int k = 0; k < 150; ++k)
   {
     const StepReport report = s.step(s.defaultInputs());
     ASSERT_TRUE(report.ok) << report.message;

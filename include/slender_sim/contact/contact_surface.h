@@ -117,9 +117,15 @@ struct BarrierLayer
 /// The barrier about an object: the sum of its layers, the outermost first. Without a stiffness it is not chosen yet.
 struct BarrierLaw
 {
-  static constexpr int kMost = 3;
-  std::array<BarrierLayer, kMost> layers{{{1.0, 0.0}, {}, {}}};
-  int count() const { return layers[2].share > 0.0 ? 3 : layers[1].share > 0.0 ? 2 : 1; }
+  static constexpr int kMost = 5;
+  std::array<BarrierLayer, kMost> layers{{{1.0, 0.0}, {}, {}, {}, {}}};
+  int count() const
+  {
+    int n = 1;
+    while (n < kMost && layers[static_cast<std::size_t>(n)].share > 0.0)
+      ++n;
+    return n;
+  }
   const BarrierLayer& innermost() const { return layers[static_cast<std::size_t>(count() - 1)]; }
   bool operator==(const BarrierLaw& b) const { return layers == b.layers; }
 };

@@ -173,8 +173,9 @@ void checkContactTime(const YamlCursor& time, SceneConfig& scene)
   {
     time.find("integrator")
         .warning(
-            "of second order carries the velocity before an impact beyond it, so that a rod or body may bounce higher "
-            "than it fell: use implicit_euler, the default with contact, where something is hit");
+            "of second order carries the velocity before an impact beyond it, so that a rod or body may leave "
+            "a collision much faster than it came: use implicit_euler, the default with contact, where something is "
+            "hit");
   }
   const bool ends_ahead =
       scene.time.integrator == Integrator::implicit_midpoint || scene.time.integrator == Integrator::generalized_alpha;
