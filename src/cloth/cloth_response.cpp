@@ -55,7 +55,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
 
 double ClothStepper::Impl::inertia(int vertex, double h) const
 {
-  double air = 0.0;   // Explicit steps leave it 0.
+  double air = 0.0;   // Loads of explicit steps have no stiffness.
   if (!averages)      // Factors of averages must last from step to step.
     for (const auto& load : system->loads())
       air += h * h * load->stiffness(vertex).norm();

@@ -61,9 +61,9 @@ bool BarrierStiffness::beginStep()
 /// This takes tenths of seconds, so that it adds little energy while a collision turns round.
 void BarrierStiffness::adapt(const Barrier& barrier, double h)
 {
-  constexpr double kLarge = 0.5;                     // share of a layer
-  constexpr double kStill = 0.02;                    // change of the smallest gap
-  constexpr double kRate = 5.0, kMostGrowth = 0.2;   // [1/s], and in a step
+  constexpr double kLarge = 0.5;                      // share of a layer
+  constexpr double kStill = 0.02;                     // change of the smallest gap
+  constexpr double kRate = 20.0, kMostGrowth = 0.2;   // [1/s], and in a step
   const double aim = largest_force_ / barrier.force(barrier.c / 5);
   while (law_.count() > 1 && share_ >= innermost().share)
     innermost() = {0.0, 0.0};

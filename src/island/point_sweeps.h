@@ -18,13 +18,13 @@ public:
   PointSweeps(const PointSweeps&) = delete;
   PointSweeps& operator=(const PointSweeps&) = delete;
 
-  /// `starts`, `rows`: the lower triangle of the pattern by columns, as in SparseCholesky. `masses`: one entry per
-  /// point [kg], 0 if its unknowns are a rotation vector. All unknowns after those of the points are multipliers, three
-  /// per average, which has the same weights for all three coordinates of a point.
+  /// `starts`, `rows`: the lower triangle of the pattern by columns, as in SparseCholesky, with ascending rows.
+  /// `masses`: one entry per point [kg], 0 if its unknowns are a rotation vector. All unknowns after those of the
+  /// points are multipliers, three per average, which has the same weights for all three coordinates of a point.
   void setPattern(const std::vector<int>& starts, const std::vector<int>& rows, const std::vector<double>& masses);
   /// `values` has one number per entry of the pattern, and `right` one per unknown, which is 0 for multipliers.
-  /// `tolerance` is relative to the right-hand side, with averages to what they leave of it. The solution is kept until
-  /// the next call.
+  /// `tolerance` is relative to the right-hand side, with averages to its projection. The solution is kept until the
+  /// next call.
   LinearResult solve(const std::vector<double>& values, const std::vector<double>& right, double tolerance,
                      int max_iterations);
   void copySolution(double* to) const;

@@ -32,7 +32,7 @@ void checkBody(const BodyProperties& b)
 
 namespace {
 
-/// Of the first step of bdf2, too.
+/// The first step of bdf2 is one of implicit Euler, too.
 bool isImplicitEuler(const StepPlan& plan, double h)
 {
   return plan.stages.size() == 1 && plan.fraction == 1.0 && plan.stages[0].tau_a == h && plan.stages[0].tau_v == h;
@@ -44,7 +44,7 @@ Eigen::Matrix3d secondMoment(const Eigen::Matrix3d& inertia)
   return 0.5 * inertia.trace() * Eigen::Matrix3d::Identity() - inertia;
 }
 
-/// Of the antisymmetric part, twice.
+/// Twice the axial vector of the antisymmetric part of c.
 Eigen::Vector3d axialVector(const Eigen::Matrix3d& c)
 {
   return {c(1, 2) - c(2, 1), c(2, 0) - c(0, 2), c(0, 1) - c(1, 0)};

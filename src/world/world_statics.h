@@ -19,7 +19,7 @@ public:
   explicit WorldStatics(WorldObjects& objects);
   void setThreads(int threads) { island_.setThreads(threads); }
   ObjectIsland& island() { return island_; }
-  /// Its own ones, which the contacts of its island are about.
+  /// The objects of the statics, to which the contacts of its island refer.
   const WorldObjects& objects() const { return objects_; }
 
   /// Solves under the inputs. Velocities become zero, and what is driven is where its inputs put it. The wrenches of

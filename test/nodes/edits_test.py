@@ -203,7 +203,7 @@ class Edits(NodeCase):
     def test_new_warnings_are_answers(self):
         # bdf2 bounces where there is contact
         self.start(ROPE.replace("step: 0.005", "step: 0.005, integrator: bdf2"))
-        self.assertIn("bounce", self.output("rod.err"))
+        self.assertIn("leave a collision", self.output("rod.err"))
         self.assertEqual(self.done("set_parameter", "wind.velocity=[0, 0, 0]").message, "")
         answer = self.done("attach", "rope: {hand: {nodes: [3], motion: {body: robot}}}")
         self.assertIn("the scene has no body or obstacle of this name", answer.message)

@@ -15,8 +15,8 @@ TimeConfig readTime(const YamlCursor& at)
   map.get("integrator", time.integrator, allUpTo(Integrator::imex),
           "Method by which time steps are taken. Without the key: tr_bdf2; implicit_euler in scenes with cloth, with "
           "contact of rods or bodies, and with rods that have `track`. Threads always take implicit_euler; imex is for "
-          "cloth alone, and symplectic_euler takes explicit steps. It, implicit_midpoint and generalized_alpha take no "
-          "contact of rods and bodies.");
+          "cloth alone, and symplectic_euler takes explicit steps. Rods and bodies with contact cannot take "
+          "symplectic_euler, implicit_midpoint and generalized_alpha.");
   map.get("spectral_radius", time.spectral_radius, Range::closed(0, 1),
           "Numerical damping of generalized_alpha: the factor by which one step changes the fastest vibrations. 1 "
           "damps nothing, 0 damps most. Without the key: 0.8.");

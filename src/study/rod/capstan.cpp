@@ -78,6 +78,10 @@ double tensionRatio(double friction, double angle, int edges)
   g.model.contact.gap = kRopeGap;
   constexpr double kStep = 0.01, kSpeed = 2e-3;   // [s], [m/s]
   World world = g.world(timeConfig(Integrator::implicit_euler, kStep, 1e-8));
+  // A barrier that was chosen presses the rope from the start. Without it the rope would settle on the drum first, and
+  // slip a little across the drum for as long as it slides by R / mu.
+  g.state.contact.rods.resize(1);
+  g.state.contact.rods[0].barrier.layers[0].stiffness = 1e-6;   // [N]; the least one is larger
   const Eigen::Vector3d way = shape.tangent(angle);
   double sum = 0.0;
   constexpr int kSteps = 300, kMean = 100;
