@@ -7,6 +7,7 @@ namespace slender {
 
 namespace {
 
+constexpr double kAim = 5.0;           // A layer over the gap at which it is to bear the load.
 constexpr double kLeastGap = 12.0;     // A layer over the gap below which the barrier is made stiffer.
 constexpr double kLeastShare = 1e-5;   // of the gap, where layers begin: thinner ones would be lost in rounding errors
 
@@ -64,7 +65,7 @@ void BarrierStiffness::adapt(const Barrier& barrier, double h)
   constexpr double kLarge = 0.5;                      // share of a layer
   constexpr double kStill = 0.02;                     // change of the smallest gap
   constexpr double kRate = 20.0, kMostGrowth = 0.2;   // [1/s], and in a step
-  const double aim = largest_force_ / barrier.force(barrier.c / 5);
+  const double aim = largest_force_ / barrier.force(barrier.c / kAim);
   while (law_.count() > 1 && share_ >= innermost().share)
     innermost() = {0.0, 0.0};
   if (isTooSmall() && shrinks())
@@ -74,7 +75,7 @@ void BarrierStiffness::adapt(const Barrier& barrier, double h)
     outer.share = std::min(share_, 1.0);
   else if (share_ > kLarge * innermost().share)
     innermost().stiffness = std::max(0.8 * innermost().stiffness, std::min(innermost().stiffness, aim));
-  if (share_ * kLeastGap < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
+  if (share_ * kAim < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
     outer.stiffness = std::clamp(aim, outer.stiffness, (1.0 + std::min(kRate * h, kMostGrowth)) * outer.stiffness);
   bound();
 }
@@ -113,7 +114,7 @@ bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)
   }
   if (!stiffened_ && !shrinks())
     return false;
-  const double aim = largest_force_ / barrier.force(barrier.c / 5);
+  const double aim = largest_force_ / barrier.force(barrier.c / kAim);
   law_before_ = law_;
   // Where a gap has collapsed, the forces are far too large to follow them.
   raise(share_begin_, converged ? aim : std::clamp(aim, 4.0 * stiffness_there_, 100.0 * stiffness_there_));

@@ -311,7 +311,7 @@ StepFailure Island::attempt(const Substep& substep, StepReport& report)
   if (conserving_ && energyAtEnd() > most_energy_)
     return StepFailure::energy_grew;
   if (ContactPotential* contact = equations_.contact())
-    contact->adaptStiffness(substep.length);
+    contact->adaptStiffness(keeps_barriers_ ? 0.0 : substep.length);
   for (failed_ = 0; failed_ < parts_.size(); ++failed_)
     if (const StepFailure failure = parts_[failed_]->finishSubstep(report); failure != StepFailure::none)
       return failure;

@@ -46,6 +46,8 @@ public:
   void setBarrier(std::size_t part, const BarrierLaw& barrier) { barrier_[part] = barrier; }
   /// Gives contact the barriers of all parts. They are no softer than `least` [N] about parts whose surfaces change.
   void loadBarriers(double least);
+  /// Standing loads stiffen no barrier from now on: an equilibrium keeps the barriers with which it was found.
+  void keepBarriers() { keeps_barriers_ = true; }
   /// Springs of friction of what sticks, see ContactPotential::springs(); part of the state.
   std::vector<FrictionSpring> springs;
 
@@ -80,7 +82,7 @@ private:
   std::vector<long> versions_;        ///< of the parts' surfaces
   std::vector<int> object_;           ///< of the surface, per part; -1: the part has none
   std::vector<BarrierLaw> barrier_;   ///< per part
-  bool surface_changes_ = false;
+  bool surface_changes_ = false, keeps_barriers_ = false;
   StepPlan plan_;
   double duration_ = 0.0, gap_ = 0.0;
   bool conserving_ = false;                        ///< the present step may not add to the energy

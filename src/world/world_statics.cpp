@@ -69,6 +69,7 @@ WorldStatics::WorldStatics(WorldObjects& objects)
   for (WorldObject* object : objects_.all)
     object->addParts(parts);
   setParts(island_.island().equations(), std::move(parts), time_.newton);
+  island_.island().keepBarriers();
 }
 
 // ---- states of its parts
