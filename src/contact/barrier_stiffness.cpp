@@ -56,15 +56,12 @@ bool BarrierStiffness::beginStep()
   return begins_inside;
 }
 
-/// An inner layer without a gap inside is removed. The outermost layer grows up to the nearest surface. A layer becomes
-/// softer while loads on it are small, but slowly, because loads come back. Under a load that stays, the outermost
-/// layer becomes as stiff as the load needs, so that inner layers, which are harder to solve, are not needed for long.
-/// This takes tenths of seconds, so that it adds little energy while a collision turns round.
+/// Removes inner layers without a gap inside. The outermost layer grows up to the nearest surface. A layer slowly gets
+/// softer while its load is small, because the same load often comes back some steps later.
 void BarrierStiffness::adapt(const Barrier& barrier, double h)
 {
-  constexpr double kLarge = 0.5;                      // share of a layer
-  constexpr double kStill = 0.02;                     // change of the smallest gap
-  constexpr double kRate = 20.0, kMostGrowth = 0.2;   // [1/s], and in a step
+  constexpr double kLarge = 0.5;    // An innermost layer may get softer if the smallest gap is above this share of it.
+  constexpr double kStill = 0.02;   // The load stands if the smallest gap has changed by less than this share.
   const double aim = largest_force_ / barrier.force(barrier.c / kAim);
   while (law_.count() > 1 && share_ >= innermost().share)
     innermost() = {0.0, 0.0};
@@ -75,9 +72,34 @@ void BarrierStiffness::adapt(const Barrier& barrier, double h)
     outer.share = std::min(share_, 1.0);
   else if (share_ > kLarge * innermost().share)
     innermost().stiffness = std::max(0.8 * innermost().stiffness, std::min(innermost().stiffness, aim));
-  if (share_ * kAim < outer.share && std::abs(share_ - share_begin_) < kStill * share_begin_)
-    outer.stiffness = std::clamp(aim, outer.stiffness, (1.0 + std::min(kRate * h, kMostGrowth)) * outer.stiffness);
+  if (std::abs(share_ - share_begin_) < kStill * share_begin_)
+    unloadInnerLayers(barrier, h);
   bound();
+}
+
+/// Under a load that stands, the outermost layer takes over the force of the inner ones, which are harder to solve. The
+/// force at the smallest gap does not change, so that nothing moves. This takes tenths of seconds: most collisions are
+/// shorter, so that they gain little energy.
+void BarrierStiffness::unloadInnerLayers(const Barrier& barrier, double h)
+{
+  constexpr double kRate = 20.0, kMostGrowth = 0.2;   // [1/s], and in a step
+  const auto forceOf = [&](const BarrierLayer& layer) {
+    return layer.share > 0.0 ? layer.stiffness * barrier.force(barrier.c * share_ / layer.share) : 0.0;
+  };
+  double inner = 0.0;
+  for (int k = 1; k < law_.count(); ++k)
+    inner += forceOf(law_.layers[static_cast<std::size_t>(k)]);
+  BarrierLayer& outer = law_.layers[0];
+  const double taken = std::min(kRate * h, kMostGrowth) * forceOf(outer);
+  if (!(inner > 0.0) || !(taken > 0.0))
+    return;
+  const double kept = std::max(0.0, 1.0 - taken / inner);
+  outer.stiffness *= 1.0 + (1.0 - kept) * inner / forceOf(outer);
+  for (int k = law_.count(); k-- > 1;)
+    if (BarrierLayer& layer = law_.layers[static_cast<std::size_t>(k)]; kept > 0.0)
+      layer.stiffness *= kept;
+    else
+      layer = {0.0, 0.0};
 }
 
 bool BarrierStiffness::isTooSmall() const { return share_ * kLeastGap < law_.innermost().share; }
@@ -119,8 +141,8 @@ bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)
   // Where a gap has collapsed, the forces are far too large to follow them.
   raise(share_begin_, converged ? aim : std::clamp(aim, 4.0 * stiffness_there_, 100.0 * stiffness_there_));
   bound();
-  stiffened_ = true;
-  return !(law_ == law_before_);
+  stiffened_ = !(law_ == law_before_);
+  return stiffened_;
 }
 
 }   // namespace slender

@@ -12,7 +12,7 @@ namespace slender {
 ///
 /// A barrier that becomes stiffer while gaps are inside it makes energy. Instead, a stiffer layer is added that begins
 /// at the smallest gap that there is. Forces remain the same function of gaps while the object is pressed, except under
-/// loads that stay, see adapt(). Inner layers without a gap inside are removed.
+/// loads that stay, see unloadInnerLayers(). Inner layers without a gap inside are removed.
 class BarrierStiffness
 {
 public:
@@ -39,6 +39,7 @@ private:
   bool isTooSmall() const;
   bool shrinks() const;
   void raise(double share, double stiffness);
+  void unloadInnerLayers(const Barrier& barrier, double h);
   void bound();
 
   BarrierLaw law_, law_before_;   ///< law_before_: before the barrier was made stiffer

@@ -106,29 +106,77 @@ TEST(ContactPotential, AdaptsItsStiffnessToTheLoad)
     return x;
   };
   potential.setStiffness(options.least_stiffness);
-  // the gap at which a constant load is carried, before every change of the stiffness
+  double gap = 0.9 * options.gap;
+  const auto forceAt = [&](double g) {
+    potential.evaluate(at(g), {Pose{}}, false);
+    double force = 0.0;
+    for (const ContactTerm& term : potential.terms())
+      force = std::max(force, term.force.norm());
+    return force;
+  };
+  // Steps under a constant load, each of which ends where the barrier bears this load.
   for (double load : {1e-6, 0.1, 1e3, 5.0, 1e-2})
   {
-    double gap = 0.0;
+    double before = 0.0;
     for (int k = 0; k < 200; ++k)
     {
-      double low = 1e-12, high = options.gap;
-      for (int i = 0; i < 200; ++i)
-      {
-        gap = 0.5 * (low + high);
-        potential.evaluate(at(gap), {Pose{}}, false);
-        double force = 0.0;
-        for (const ContactTerm& term : potential.terms())
-          force = std::max(force, term.force.norm());
-        (force > load ? low : high) = gap;
-      }
-      potential.adaptStiffness(1.0);
       potential.begin(at(gap), {Pose{}}, 0.01);
+      before = gap;
+      do
+      {
+        potential.beginSolution();
+        double low = 1e-12, high = options.gap;
+        for (int i = 0; i < 200; ++i)
+        {
+          gap = 0.5 * (low + high);
+          (forceAt(gap) > load ? low : high) = gap;
+        }
+      }
+      while (potential.stiffen(true));
+      potential.adaptStiffness(0.01);
     }
+    EXPECT_NEAR(gap, before, 1e-9 * options.gap) << load;
+    EXPECT_EQ(potential.barrier(0).count(), 1) << load;   // Nothing but the outermost layer bears a load that stands.
     EXPECT_GE(potential.barrier(0).layers[0].stiffness, options.least_stiffness);
     EXPECT_GT(gap, options.gap / 20) << load;
     if (load > options.least_stiffness)
       EXPECT_LT(gap, options.gap / 1.9);
+  }
+}
+
+/// What two solids squeeze to a fixed distance exerts the same force for ever.
+TEST(ContactPotential, DoesNotAddForceWhereGapsAreFixed)
+{
+  ContactSurface surface;
+  surface.points = 2;
+  surface.segments.push_back({0, 1, 0.01, 0, 0.0, 0.1});
+  surface.objects.push_back({{true, true, true, 0.0}});
+  surface.solids.push_back({Plane{}, -1.0, {}});
+  ContactOptions options;
+  options.gap = 1e-3;
+  ContactPotential potential(surface, options);
+  potential.setStiffness(1.0);
+  Eigen::Matrix3Xd x(3, 2);
+  for (const double share : {0.1, 0.01, 1e-3})
+  {
+    double first = 0.0, last = 0.0;
+    for (int k = 0; k < 400; ++k)
+    {
+      const double gap = options.gap * std::max(share, 0.9 * std::pow(0.8, k));   // closes, and stays
+      x << 0, 0.1, 0, 0, 0.01 + gap, 0.01 + gap;
+      do
+      {
+        potential.beginSolution();
+        potential.evaluate(x, {Pose{}}, false);
+      }
+      while (potential.stiffen(true));
+      last = potential.terms().front().force.norm();
+      if (k == 60)
+        first = last;
+      potential.adaptStiffness(0.01);
+      potential.begin(x, {Pose{}}, 0.01);
+    }
+    EXPECT_NEAR(last, first, 1e-6 * first) << share;
   }
 }
 

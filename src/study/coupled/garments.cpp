@@ -353,20 +353,24 @@ void runGarments(StudyContext& context)
   if (context.quick())
     motions.resize(1);
   const int total = static_cast<int>(motions.size() * runs.size());
+  const std::vector<int> cases = context.cases(total);
   int done = 0, refused = 0, unfinished = 0, penetrations = 0;
   double room = kFar;
   double factor[5] = {kFar, kFar, kFar, kFar, kFar};   // by fineness
-  for (const GarmentRun& run : runs)
-    for (const FigureMotion& motion : motions)
-    {
-      context.progress(done++, total, motion.name + ", " + run.garment);
-      const GarmentResult result = runGarment(context, motion, run);
-      refused += !result.refusal.empty();
-      unfinished += !result.finished;
-      penetrations += result.penetrations;
-      room = std::min(room, result.room);
-      factor[run.fineness] = std::min(factor[run.fineness], result.realTimeFactor());
-    }
+  for (const int number : cases)
+  {
+    if (number >= total)
+      throw std::invalid_argument("garments: cases are numbered from 0 to " + std::to_string(total - 1) + ".");
+    const GarmentRun& run = runs[number / motions.size()];
+    const FigureMotion& motion = motions[number % motions.size()];
+    context.progress(done++, static_cast<int>(cases.size()), motion.name + ", " + run.garment);
+    const GarmentResult result = runGarment(context, motion, run);
+    refused += !result.refusal.empty();
+    unfinished += !result.finished;
+    penetrations += result.penetrations;
+    room = std::min(room, result.room);
+    factor[run.fineness] = std::min(factor[run.fineness], result.realTimeFactor());
+  }
   context.metric("refused", refused);
   context.metric("unfinished", unfinished);
   context.metric("penetrations", penetrations);
@@ -382,6 +386,7 @@ void runGarments(StudyContext& context)
 }
 
 const StudyRegistration kGarmentsRegistration{
-    "garments", "a cape, a skirt and a poncho on a figure that walks, dances and turns over backwards", runGarments};
+    "garments", "a cape, a skirt and a poncho on a figure that walks, dances and turns over backwards", runGarments,
+    true};
 
 }   // namespace slender::study
