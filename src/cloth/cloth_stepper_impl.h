@@ -38,8 +38,8 @@ public:
   StepReport statics(ClothState& state, const ClothInputs& inputs, bool search, bool leave_saddles);
   bool respond(const Eigen::Matrix3Xd& forces, double duration, Eigen::Matrix3Xd& displacement,
                Eigen::Matrix3Xd& pin_forces_change, Eigen::Matrix3Xd& average_forces_change);
-  /// Force per change of the velocity of a vertex at the end of the last step, times its h seconds [kg]: the mass, and
-  /// what implicit steps know of damping by mass and of air, as it resists along the normal of flat cloth.
+  /// Effective mass of a vertex [kg] at the end of a step of h seconds: impulse over change of velocity. It contains
+  /// the mass, damping by mass, and the drag of air along the normal of flat cloth.
   double inertia(int vertex, double h) const;
 
   ClothPart& part() { return part_; }

@@ -7,9 +7,9 @@ namespace slender {
 
 namespace {
 
-constexpr double kAim = 5.0;           // A layer over the gap at which it is to bear the load.
-constexpr double kLeastGap = 12.0;     // A layer over the gap below which the barrier is made stiffer.
-constexpr double kLeastShare = 1e-5;   // of the gap, where layers begin: thinner ones would be lost in rounding errors
+constexpr double kAim = 5.0;           // Range of a layer over the gap at which the layer shall bear the load.
+constexpr double kLeastGap = 12.0;     // Range of a layer over the smallest gap that is allowed; below it stiffens.
+constexpr double kLeastShare = 1e-5;   // smallest range of a layer, of the gap; thinner ones are lost in rounding
 
 }   // namespace
 
@@ -70,7 +70,7 @@ void BarrierStiffness::adapt(const Barrier& barrier, double h)
   BarrierLayer& outer = law_.layers[0];
   if (share_ >= outer.share)
     outer.share = std::min(share_, 1.0);
-  else if (share_ > kLarge * innermost().share)
+  else if (h > 0.0 && share_ > kLarge * innermost().share)
     innermost().stiffness = std::max(0.8 * innermost().stiffness, std::min(innermost().stiffness, aim));
   if (std::abs(share_ - share_begin_) < kStill * share_begin_)
     unloadInnerLayers(barrier, h);
@@ -112,10 +112,10 @@ bool BarrierStiffness::shrinks() const
 }
 
 /// Makes the barrier stiffer for gaps below this share alone. If no layer can be added and gaps are inside the
-/// innermost one, nothing changes. A new layer is so stiff that it can take more energy than the thicker one around it.
+/// innermost one, nothing changes.
 void BarrierStiffness::raise(double share, double stiffness)
 {
-  constexpr double kStiffer = 100.0;   // Its share may be a twelfth.
+  constexpr double kStiffer = 100.0;   // A layer that is twelve times thinner can then still store more energy.
   const int count = law_.count();
   if (share >= innermost().share)
     innermost().stiffness = stiffness;
@@ -138,7 +138,7 @@ bool BarrierStiffness::stiffen(const Barrier& barrier, bool converged)
     return false;
   const double aim = largest_force_ / barrier.force(barrier.c / kAim);
   law_before_ = law_;
-  // Where a gap has collapsed, the forces are far too large to follow them.
+  // If the solution did not converge, the largest force may be far too large.
   raise(share_begin_, converged ? aim : std::clamp(aim, 4.0 * stiffness_there_, 100.0 * stiffness_there_));
   bound();
   stiffened_ = !(law_ == law_before_);

@@ -25,7 +25,8 @@ void ContactPotential::takeDisplacements(const Eigen::Matrix3Xd& x_end)
 
 /// How deep [m] what moves straight may get into a solid before it counts as having passed through: half of the radius
 /// of the largest ball in the solid or in the body that the object belongs to, whichever is smaller. What slides around
-/// a solid, or rolls over it, gets less deep on straight ways, unless its step is long. Infinite where nothing counts.
+/// a solid, or rolls over it, gets less deep on straight ways, unless its step is long. It is infinite for pairs that
+/// are never examined: a plane, a body and its own solid, and a mesh and an object without a round body.
 double ContactPotential::depthOfPassing(int object, int solid) const
 {
   const int carrier = surface_.objects[object].carrier;
@@ -35,8 +36,8 @@ double ContactPotential::depthOfPassing(int object, int solid) const
   return 0.5 * std::min(innerRadius(piece), carrier >= 0 ? innerRadius(solids_[carrier].pieces.front()) : kInfinity);
 }
 
-/// Whether a piece of an object crosses the core of a solid. The triangles of a mesh have no core: a piece may get into
-/// them less deep than it is thick.
+/// Whether a piece of an object crosses the core of a solid. A triangle of a mesh has no inside: there the piece may
+/// come as near as its radius less the depth.
 bool ContactPotential::crossesCore(const SurfaceMotion& motion, const int* corner, int corners, int object, int solid,
                                    int piece, double radius) const
 {

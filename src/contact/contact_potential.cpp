@@ -263,11 +263,11 @@ bool ContactPotential::add(const Place& place, const Candidates::OnSolid& on, Ba
                   {},
                   on.solid,
                   foot,
-                  pose * foot,
+                  Eigen::Vector3d::Zero(),
                   Eigen::Vector3d::Zero(),
                   s.object,
                   -1};
-  setOwn(contact, place.poses);
+  setPlaces(place.poses, gap.normal, contact);
   return addContact(place, gap, contact, rangeOf(s.object, on.solid), out);
 }
 

@@ -72,7 +72,7 @@ public:
 
   /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
   /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from
-  /// earlier steps but stiffness() and springs().
+  /// earlier steps but barrier() and springs().
   void begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, double h);
   /// Tells where prescribed points and solids go in the next solution: from (x, solids) to (x_end, solids_end). If a
   /// prescribed solid comes too near to held points, neither can give way. Then the pieces at these points let the
@@ -148,7 +148,7 @@ public:
   /// smallest gap of the object in begin(), so that nothing is thrown from where it stands.
   /// adaptStiffness(), after a step of h seconds, follows the largest normal force on each object in the last
   /// evaluate(): it aims at a smallest gap of a fifth and acts outside a twelfth to a half of the innermost layer. It
-  /// makes the barrier stiffer only where stiffen() would.
+  /// makes the barrier stiffer only where stiffen() would. With h = 0 the present forces stay as they are.
   const BarrierLaw& barrier(int object) const { return stiffness_[object].law(); }
   /// The stiffness of the outermost layer is bounded by the range, which holds until the next call, and whose least
   /// value is at least ContactOptions::least_stiffness.
@@ -180,7 +180,9 @@ private:
     double friction = 0.0;             ///< of the two, once the contact is lagged
     /// Of its spring: force where the step begins, and in the last evaluation.
     Eigen::Vector3d tension_begin = Eigen::Vector3d::Zero(), tension = Eigen::Vector3d::Zero();
-    Eigen::Vector3d own = Eigen::Vector3d::Zero();     ///< the position in the frame of the carrier, if there is one
+    Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< with a carrier: the position in its frame
+    /// roundPart() of the solid and of the carrier, world. `material` and `own` lack it once they are set.
+    Eigen::Vector3d round = own, own_round = own;
     int first_points = 2;                              ///< how many of the points belong to the first piece
     std::array<ContactTerm::Turn, 2> turn{};           ///< of friction
     bool levers = false;                               ///< whether any lever is not zero
@@ -264,12 +266,9 @@ private:
   bool add(const Place& place, const Candidates::OnSolid& on, Batch& out) const;
   bool add(const Place& place, const SheetCandidates::Pair& pair, Batch& out) const;
   bool add(const Place& place, const SheetCandidates::OnSolid& on, Batch& out) const;
-  /// Sets the place of a contact in the frame of the body that carries the first piece. Friction needs it.
-  void setOwn(Contact& contact, const std::vector<Pose>& poses) const
-  {
-    if (const int carrier = surface_.objects[contact.object].carrier; carrier >= 0)
-      contact.own = poses[carrier].inverse() * contact.position;
-  }
+  /// Sets what friction needs to know of where a solid is touched, from `material` in the solid's frame. `normal`:
+  /// world.
+  void setPlaces(const std::vector<Pose>& poses, const Eigen::Vector3d& normal, Contact& contact) const;
   /// Adds a contact if its gap is small enough. `scale`: the share of the gap at which the pair repels. Returns false
   /// if the pieces meet.
   bool addContact(const Place& place, const PairGap& gap, Contact& contact, double scale, Batch& out) const;
@@ -299,6 +298,8 @@ private:
   FrictionSpring springOf(const Contact& contact) const;
   bool turnsWithSolid(const Contact& contact) const;
   double spin(const Contact& contact, const std::vector<Pose>& poses) const;
+  Eigen::Vector3d displacement(int solid, const Eigen::Vector3d& place, const Eigen::Vector3d& round,
+                               const std::vector<Pose>& poses) const;
   double addFriction(const Place& place, const Eigen::VectorXd* turns);
   double addTerms(const Place& place, const Eigen::VectorXd* turns);
   double addFriction(const Place& place, const Eigen::VectorXd* turns, Contact& contact, Batch& out) const;

@@ -89,11 +89,10 @@ bool ContactPotential::add(const Place& place, const SheetCandidates::OnSolid& o
   contact.material = -(gap.gap / gap.weight + radius) * gap.normal;
   for (int k = 0; k < face.corners; ++k)
     contact.material += gap.place[k] * z[k];
-  contact.position = pose * contact.material;
   gap.normal = pose.orientation * gap.normal;
   contact.object = face.object;
   contact.other = -1;
-  setOwn(contact, place.poses);
+  setPlaces(place.poses, gap.normal, contact);
   return addContact(place, gap, contact, rangeOf(face.object, on.solid), out);
 }
 

@@ -6,6 +6,7 @@
 
 #include "contact_potential.h"
 #include "slender_sim/contact/friction.h"
+#include "slender_sim/geometry/rotation.h"
 
 namespace slender {
 
@@ -30,11 +31,7 @@ double turnAbout(const Eigen::Vector3d& axis, const Pose& from, const Pose& to)
 {
   if (to.orientation.coeffs() == from.orientation.coeffs())
     return 0.0;
-  Eigen::Quaterniond turn = to.orientation * from.orientation.conjugate();
-  if (turn.w() < 0.0)
-    turn.coeffs() = -turn.coeffs();
-  const double sine = turn.vec().norm();
-  return sine > 0.0 ? 2.0 * std::atan2(sine, turn.w()) * axis.dot(turn.vec()) / sine : 0.0;
+  return axis.dot(rotationVector(to.orientation * from.orientation.conjugate()));
 }
 
 /// The order of contacts.
@@ -60,6 +57,37 @@ double ContactPotential::frictionOf(const Contact& contact) const
   return own > 0.0 && other >= 0.0 ? std::sqrt(own * other) : own;
 }
 
+/// Returns how far a solid has moved since the step began where it is touched [m]. `place` moves with its material, in
+/// its frame. From there, `round` leads to the contact: what rolls turns its material away below the contact, and the
+/// contact stays below its centre. The path of the material is then an arc, and not the chord of this arc.
+Eigen::Vector3d ContactPotential::displacement(int solid, const Eigen::Vector3d& place, const Eigen::Vector3d& round,
+                                               const std::vector<Pose>& poses) const
+{
+  const Pose &from = solids_begin_[solid], &to = poses[solid];
+  Eigen::Vector3d u = to * place - from * place;
+  if (!round.isZero(0.0) && to.orientation.coeffs() != from.orientation.coeffs())
+    u += rotationVector(to.orientation * from.orientation.conjugate()).cross(round);
+  return u;
+}
+
+void ContactPotential::setPlaces(const std::vector<Pose>& poses, const Eigen::Vector3d& normal, Contact& contact) const
+{
+  const auto split = [&](int solid, const ConvexPiece& piece, Eigen::Vector3d& place, Eigen::Vector3d& round) {
+    const Eigen::Quaterniond& turn = poses[solid].orientation;
+    const Eigen::Vector3d part = roundPart(piece, place, turn.conjugate() * normal);
+    place -= part;
+    round = turn * part;
+  };
+  contact.position = poses[contact.solid] * contact.material;
+  if (const int carrier = surface_.objects[contact.object].carrier; carrier >= 0)
+  {
+    contact.own = poses[carrier].inverse() * contact.position;
+    split(carrier, solids_[carrier].pieces.front(), contact.own, contact.own_round);
+  }
+  const auto piece = static_cast<std::size_t>(contact.second & 0xffffffff);
+  split(contact.solid, solids_[contact.solid].pieces[piece], contact.material, contact.round);
+}
+
 double ContactPotential::addFriction(const Place& place, const Eigen::VectorXd* turns, Contact& contact,
                                      Batch& out) const
 {
@@ -72,7 +100,7 @@ double ContactPotential::addFriction(const Place& place, const Eigen::VectorXd* 
   const int carrier = surface_.objects[contact.object].carrier;
   term.carried = carrier >= 0;
   if (term.carried)
-    u = poses[carrier] * contact.own - solids_begin_[carrier] * contact.own;
+    u = displacement(carrier, contact.own, contact.own_round, poses);
   const Eigen::Vector3d n = contact.force / normal_force;
   if (contact.levers)
   {
@@ -84,8 +112,8 @@ double ContactPotential::addFriction(const Place& place, const Eigen::VectorXd* 
       u += term.moveBy(i, place.x.col(contact.point[i]) - x_begin_.col(contact.point[i]));
   if (contact.solid >= 0)
   {
-    term.position = poses[contact.solid] * contact.material;
-    u -= term.position - solids_begin_[contact.solid] * contact.material;
+    term.position = poses[contact.solid] * contact.material + contact.round;
+    u -= displacement(contact.solid, contact.material, contact.round, poses);
   }
   term.turn = contact.turn;
   for (const ContactTerm::Turn& turn : contact.turn)

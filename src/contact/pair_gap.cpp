@@ -285,6 +285,26 @@ double leastFaceDistance(const ConvexPiece& piece, const Vector* corner, int cor
   return std::max(0.0, at.distance + least);
 }
 
+namespace {
+
+/// The largest n . x on a convex piece; infinite for a plane.
+double supportOf(const ConvexPiece& piece, const Vector& n)
+{
+  if (const auto* s = std::get_if<Sphere>(&piece))
+    return s->radius * n.norm();
+  if (const auto* b = std::get_if<Box>(&piece))
+    return 0.5 * b->size.dot(n.cwiseAbs());
+  if (const auto* c = std::get_if<Cylinder>(&piece))
+    return c->radius * n.head<2>().norm() + 0.5 * c->length * std::abs(n.z());
+  if (const auto* k = std::get_if<Capsule>(&piece))
+    return k->radius * n.norm() + 0.5 * k->length * std::abs(n.z());
+  if (const auto* t = std::get_if<Triangle>(&piece))
+    return std::max({n.dot((*t)[0]), n.dot((*t)[1]), n.dot((*t)[2])});
+  return std::numeric_limits<double>::infinity();
+}
+
+}   // namespace
+
 FacePlane separatingPlane(const ConvexPiece& piece, const Vector* corner, int corners, double thickness)
 {
   FacePlane out{0.0, false, corner[0], Vector::UnitZ()};
@@ -310,12 +330,24 @@ FacePlane separatingPlane(const ConvexPiece& piece, const Vector* corner, int co
     out.normal = at.normal;
   }
   out.meets = !(out.distance > thickness);
-  int lowest = 0;
-  for (int k = 1; k < corners; ++k)
-    if (out.normal.dot(corner[k] - corner[lowest]) < 0.0)
-      lowest = k;
-  out.foot = corner[lowest];
+  const auto lowestAlong = [&](const Vector& n) {
+    int lowest = 0;
+    for (int k = 1; k < corners; ++k)
+      if (n.dot(corner[k] - corner[lowest]) < 0.0)
+        lowest = k;
+    return corner[lowest];
+  };
+  out.foot = lowestAlong(out.normal);
   out.distance += out.normal.dot(out.foot - place);
+  if (corners < 3)
+    return out;
+  // The plane of a small face of the piece cuts the far corners of a wide triangle, even if it is hardly tilted.
+  Vector n = (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
+  if (n.dot(out.normal) < 0.0)
+    n = -n;
+  const Vector foot = lowestAlong(n);
+  if (const double distance = n.dot(foot) - supportOf(piece, n); distance > out.distance)
+    return {distance, out.meets, foot, n};
   return out;
 }
 

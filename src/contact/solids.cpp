@@ -146,6 +146,18 @@ double innerRadius(const ConvexPiece& piece)
   return std::numeric_limits<double>::infinity();
 }
 
+Eigen::Vector3d roundPart(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& normal)
+{
+  constexpr double kSide = 0.5;   // sine of the angle to the side of a cylinder at which its end begins
+  if (std::holds_alternative<Sphere>(piece))
+    return p;
+  if (const auto* k = std::get_if<Capsule>(&piece))
+    return {p.x(), p.y(), p.z() - std::clamp(p.z(), -0.5 * k->length, 0.5 * k->length)};
+  if (std::holds_alternative<Cylinder>(piece) && std::abs(normal.z()) < kSide)
+    return {p.x(), p.y(), 0.0};
+  return Eigen::Vector3d::Zero();
+}
+
 ConvexPiece withoutLayer(const ConvexPiece& piece, double depth)
 {
   if (const auto* s = std::get_if<Sphere>(&piece))

@@ -64,7 +64,12 @@ Twist PoseTrajectory::slopeAt(std::size_t k) const
   const auto turn = [this](std::size_t a, std::size_t b) {
     return rotationVector(samples_[a].orientation.conjugate() * samples_[b].orientation);
   };
-  return {slope(k, same_position, shift), slope(k, same_orientation, turn)};
+  Eigen::Vector3d linear = slope(k, same_position, shift);
+  for (int axis = 0; axis < 3 && !growing_; ++axis)
+    linear[axis] = slope(k, same_position, [&](std::size_t a, std::size_t b) {
+      return Eigen::Vector3d(shift(a, b)[axis] * Eigen::Vector3d::Unit(axis));
+    })[axis];
+  return {linear, slope(k, same_orientation, turn)};
 }
 
 Pose PoseTrajectory::evaluate(double time, Twist* velocity) const

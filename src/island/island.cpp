@@ -81,7 +81,8 @@ void Island::loadBarriers(double least)
       continue;
     BarrierRange range = parts_[k]->barrierRange(gap_);
     BarrierLaw law = barrier_[k];
-    if (parts_[k]->surfaceChanges())   // New pieces come into being where gaps are small, which chooses no law.
+    if (parts_[k]
+            ->surfaceChanges())   // Pieces that are new may be very near to others. Barriers do not begin at such gaps.
     {
       range.least = std::max(range.least, least);
       law.layers[0].stiffness =

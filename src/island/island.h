@@ -46,7 +46,7 @@ public:
   void setBarrier(std::size_t part, const BarrierLaw& barrier) { barrier_[part] = barrier; }
   /// Gives contact the barriers of all parts. They are no softer than `least` [N] about parts whose surfaces change.
   void loadBarriers(double least);
-  /// Standing loads stiffen no barrier from now on: an equilibrium keeps the barriers with which it was found.
+  /// From now on a step leaves the forces of barriers as they are, so that an equilibrium keeps its contact forces.
   void keepBarriers() { keeps_barriers_ = true; }
   /// Springs of friction of what sticks, see ContactPotential::springs(); part of the state.
   std::vector<FrictionSpring> springs;

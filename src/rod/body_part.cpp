@@ -187,6 +187,14 @@ void BodyPart::begin(const RigidBodyState& state, const Eigen::Vector3d& step_gr
   gravity = step_gravity;
 }
 
+/// Friction knows the turn of a body in a substep only if it is less than half a turn.
+double BodyPart::longestSubstep(double duration) const
+{
+  constexpr double kMostTurn = 2.0;   // [rad]
+  const double rate = now_.velocity.angular.norm();
+  return hasSurface() && friction_ > 0.0 && rate * duration > kMostTurn ? kMostTurn / rate : duration;
+}
+
 StepFailure BodyPart::beginSubstep(const StepPlan& plan, const Substep& substep)
 {
   plan_ = &plan;

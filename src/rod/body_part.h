@@ -104,6 +104,7 @@ private:
   double forceScale() const override;
 
   // ---- its steps
+  double longestSubstep(double duration) const override;
   StepFailure beginSubstep(const StepPlan& plan, const Substep& substep) override;
   double lastSubstep() const override { return now_.last_step; }
   bool startsFresh() const override { return now_.last_step == 0.0; }

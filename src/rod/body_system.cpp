@@ -127,7 +127,7 @@ void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, c
   // first trial: the motion carried on
   const double ahead = index == 0 ? stage.time * h : (stage.time - plan.stages[0].time) * h;
   const double c = model_.angular_damping;
-  // Damping acts by the velocity to come. With the present velocity strong damping would turn the motion round.
+  // Damping is computed with the new velocity. With the present one, strong damping would reverse the motion.
   const Eigen::Vector3d w =
       (velocity_.angular + ahead * (acceleration_.angular + c * velocity_.angular)) / (1.0 + ahead * c);
   pose.position = base_.position + ahead * velocity_.linear + 0.5 * ahead * ahead * acceleration_.linear;
@@ -150,7 +150,7 @@ void BodySystem::beginStage(const StepPlan& plan, std::size_t index, double h, c
 }
 
 /// The targets of implicit Euler: where the body, with what it carries, would be after h seconds without forces. Its
-/// angular momentum is kept then. In the first trial the torque of the last step goes on.
+/// angular momentum is kept then. The first trial assumes the torque of the last step.
 void BodySystem::moveFreely(double h)
 {
   const Eigen::Vector3d arm = start_ * whole_centre_, start = momentum(start_, history_[kV].r);
@@ -165,10 +165,9 @@ void BodySystem::moveFreely(double h)
   pose.orientation = (fromRotationVector(turn) * pose.orientation).normalized();
 }
 
-/// The targets of the other methods, by the angular velocity w of the first trial. Points of the body have the
-/// acceleration w x (w x r) beside that of the rotation vector, which R^ contains. With half of it in R~,
-/// (R - R~) / tau_v is the rate at the stage, without it the rate tau_v / 2 earlier, so that damping would be of first
-/// order.
+/// The targets of the other methods, by the angular velocity w of the first trial. The target R^ of inertia contains
+/// the centripetal acceleration w x (w x r) of points of the body. R~ contains half of it: then (R - R~) / tau_v is the
+/// rate at the stage. Without that half it would be the rate tau_v / 2 earlier, and damping would be of first order.
 void BodySystem::aimAhead(const Stage& stage, const Eigen::Vector3d& w)
 {
   const Motion hat = combine(stage.q_hat);
@@ -241,8 +240,8 @@ void BodySystem::endStage(const Stage& stage, bool last)
   history_[kVStage] = {velocity_.linear, rate};
 }
 
-/// The angular momentum of the body, with what it carries, changes by the torque of everything but inertia, which at
-/// the solution is opposite to that of inertia.
+/// The torque of all forces but inertia changes the angular momentum of the body and of what it carries. At the
+/// solution it is the opposite of the torque of inertia.
 void BodySystem::advanceMomentum(double h)
 {
   const Eigen::Matrix3d r = pose.orientation.toRotationMatrix();

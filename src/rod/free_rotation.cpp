@@ -41,9 +41,9 @@ Eigen::Vector3d angularVelocity(const Eigen::Matrix3d& inertia, const Eigen::Qua
 Eigen::Quaterniond rotateFreely(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q,
                                 const Eigen::Vector3d& momentum, double h)
 {
-  // Newton's method converges up to about 1.5 rad in a part of the time, for needles up to 1 rad.
+  // Newton's method converges if a part of the time turns the body by less than 1.5 rad, or a needle by 1 rad.
   constexpr double kMostTurn = 0.5;
-  constexpr double kMostParts = 1e5;   // Faster bodies turn thousands of times in a step.
+  constexpr double kMostParts = 1e5;   // This limits the cost; faster bodies turn thousands of times in a step.
   const double parts = std::ceil(h * angularVelocity(inertia, q, momentum).norm() / kMostTurn);
   const int count = std::isfinite(parts) ? static_cast<int>(std::clamp(parts, 1.0, kMostParts)) : 1;
   Eigen::Quaterniond end = q;

@@ -9,8 +9,9 @@ Eigen::Vector3d angularVelocity(const Eigen::Matrix3d& inertia, const Eigen::Qua
                                 const Eigen::Vector3d& momentum);
 
 /// Orientation, after h seconds without torque, of a rigid body with this angular momentum (world axes). The method is
-/// the midpoint rule for the momentum in body axes, whose turn is an exponential. It is of second order, exact for
-/// rotation about a principal axis, and keeps momentum and energy to round-off.
+/// the midpoint rule for the momentum in body axes; the turn of a part of the time is the exponential of the rotation
+/// vector. The method is of second order and exact for rotation about a principal axis. It keeps momentum and energy to
+/// round-off.
 Eigen::Quaterniond rotateFreely(const Eigen::Matrix3d& inertia, const Eigen::Quaterniond& q,
                                 const Eigen::Vector3d& momentum, double h);
 

@@ -227,6 +227,45 @@ TEST(BodyContact, ABallRollsAndSlipsBeyondSevenHalvesOfTheFriction)
   EXPECT_NEAR(acceleration(slips), expected, 0.005 * expected);
 }
 
+/// What rolls keeps its speed, and what spins gets the speed of rolling, also when a step turns it by several radians.
+TEST(BodyContact, FastRollingNeedsNoShortSteps)
+{
+  for (const double turn : {0.1, 1.0, 2.0, 5.0})   // per step [rad]
+  {
+    const double radius = 0.01, rate = turn / 0.005;
+    const auto scene = [&](double speed) {
+      std::ostringstream text;
+      text << "time: {step: 0.005, duration: 2, integrator: implicit_euler}\nbodies:\n  - {name: ball, density: 1000, "
+              "shape: {sphere: {radius: 0.01}}, pose: {position: [0, 0, 0.01001]}, friction: 0.3, velocity: {linear: ["
+           << speed << ", 0, 0], angular: [0, " << rate << ", 0]}}\n"
+           << kFloor;
+      return text.str();
+    };
+    Simulation rolls(parseScene(scene(rate * radius))), spins(parseScene(scene(0.0)));
+    runFor(rolls, 0.5);
+    runFor(spins, 2.0);
+    EXPECT_NEAR(rolls.state().bodies[0].velocity.linear.x(), rate * radius, 1e-6 * rate * radius) << turn;
+    // Lands within a step: friction acts a little earlier or later.
+    EXPECT_NEAR(spins.state().bodies[0].velocity.linear.x(), 2.0 / 7.0 * rate * radius, 1e-3 * rate * radius) << turn;
+  }
+}
+
+/// The plane of a small face cuts a wide plate that is hardly tilted. Steps were refused because of it.
+TEST(BodyContact, ABoxStandsAnywhereOnAWidePlate)
+{
+  for (const char* place : {"-0.2, 0.03", "-0.1, 0", "0.07, -0.05"})
+  {
+    Simulation s(parseScene(
+        "time: {step: 0.005, duration: 1, integrator: implicit_euler}\nbodies:\n  - {name: plate, mass: 2, shape: "
+        "{box: {size: [0.5, 0.3, 0.05]}}, pose: {position: [0, 0, 0.0251]}, friction: 0.3}\n  - {name: box, mass: 1, "
+        "shape: {box: {size: [0.1, 0.1, 0.1]}}, pose: {position: [" +
+        std::string(place) + ", 0.1003]}, friction: 0.3}\n" + kFloor));
+    runFor(s, 0.5);
+    EXPECT_NEAR(s.state().bodies[1].X_WB.position.z(), 0.1, 1e-3) << place;
+    EXPECT_LT(s.state().bodies[1].velocity.linear.norm(), 1e-6) << place;
+  }
+}
+
 TEST(BodyContact, AStackOfTenBoxesStands)
 {
   constexpr double kSide = 0.1, kGap = 0.0004;

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "slender_sim/geometry/rotation.h"
+#include "slender_sim/scene/reader.h"
+#include "slender_sim/scene/simulation.h"
 #include "test/support/groups.h"
 
 namespace slender::test {
@@ -245,6 +247,28 @@ TEST(RodContact, RestartIsBitEqual)
     ASSERT_TRUE(other.step(copy, g.inputs).ok);
     ASSERT_EQ(g.state.rods[0].x, copy.rods[0].x) << k;
   }
+}
+
+/// An equilibrium has the contact forces with which it was found.
+TEST(RodContact, ForcesAtAnEquilibriumBearTheWeight)
+{
+  Simulation simulation(parseScene(R"(
+time: {step: 0.005, duration: 1}
+start: equilibrium
+rods:
+  - name: rope
+    centerline: {straight: {from: [-0.2, 0, 0.2052], to: [0.2, 0, 0.2052], edges: 40}}
+    cross_section: {radius: 0.005}
+    material: {density: 1100, youngs_modulus: 1.0e7, poissons_ratio: 0.45}
+    contact: {friction: 0}
+    grasps: {a: {edges: [0]}, b: {edges: [-1]}}
+obstacles: [{name: ball, shape: {sphere: {radius: 0.05}}, pose: {position: [0.03, 0, 0.15]}}]
+)"));
+  const double weight = 1100 * M_PI * 0.005 * 0.005 * 0.4 * 9.81;
+  double borne = simulation.world().contactLoads().obstacles[0].force.z() * -1.0;
+  for (const Wrench& wrench : simulation.state().wrenches)
+    borne -= wrench.force.z();
+  EXPECT_NEAR(borne, weight, 1e-5 * weight);
 }
 
 }   // namespace

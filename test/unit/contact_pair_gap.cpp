@@ -106,6 +106,24 @@ TEST(PairGap, PlanesSeparateTrianglesFromSolids)
     }
 }
 
+/// A plate that lies on a small box, and is hardly tilted.
+TEST(PairGap, PlanesSeparateWideTrianglesFromSmallBoxes)
+{
+  const ConvexPiece box = Box{{0.1, 0.1, 0.1}};
+  for (const double tilt : {1e-6, 1e-5, 1e-4, 1e-3})
+    for (const double gap : {1e-6, 1e-5, 1e-4})
+    {
+      const auto at = [&](double x, double y) {   // Its lowest place is above the corner (-0.05, -0.05, 0.05).
+        return Vector(x, y, 0.05 + gap + tilt * ((x + 0.05) + 0.7 * (y + 0.05)));
+      };
+      const Vector z[3] = {at(-0.35, -0.2), at(0.2, -0.2), at(-0.15, 0.4)};
+      const FacePlane plane = separatingPlane(box, z, 3, 0.0);
+      EXPECT_FALSE(plane.meets);
+      EXPECT_GE(plane.distance, 0.9 * gap) << tilt << " " << gap;
+      EXPECT_LE(plane.distance, gap * (1.0 + 1e-6)) << tilt << " " << gap;
+    }
+}
+
 TEST(PairGap, OfAPointAndATriangleIsTheDistance)
 {
   Random random(3);

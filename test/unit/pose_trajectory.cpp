@@ -235,6 +235,19 @@ TEST(PoseTrajectory, pausesDoNotOvershoot)
   }
 }
 
+/// A table closes a gripper, waits, and lifts it: nothing leaves the range of the rows.
+TEST(PoseTrajectory, eachCoordinatePausesOnItsOwn)
+{
+  const auto at = [](double x, double z) { return Pose{{x, 0.0, z}, Eigen::Quaterniond::Identity()}; };
+  const PoseTrajectory trajectory({0.0, 1.0, 2.0}, {at(-0.06, 0.03), at(-0.035, 0.03), at(-0.035, 0.13)});
+  for (double t = 0.0; t <= 2.0; t += 0.01)
+  {
+    const Eigen::Vector3d p = trajectory.evaluate(t).position;
+    EXPECT_LE(p.x(), -0.035 + 1e-15) << t;
+    EXPECT_GE(p.z(), 0.03 - 1e-15) << t;
+  }
+}
+
 TEST(PoseTrajectory, aBurstOfSamplesDoesNotThrowThePoseAway)
 {
   // Two samples 0.1 ms apart with 1 mm of noise between them would give a three-point slope of 10 m/s, and so an

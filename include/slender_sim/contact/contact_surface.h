@@ -81,7 +81,7 @@ struct ContactSolid : Obstacle
   int only = -1;                ///< touches nothing but the objects of this owner; -1: those of all
   int number = -1;              ///< IgnoredSolid refers to this number; -1: no object ignores the solid
   bool body = false;            ///< moves freely, so that triangles touch it wherever their corners are driven
-  double least_stiffness = 0;   ///< of the barrier about it [N], see ContactPotential::stiffness()
+  double least_stiffness = 0;   ///< of the barrier about it [N], see ContactPotential::barrier()
   /// Numbers of objects, in ascending order, and shares of the gap in (0, 1]. The solid repels such an object only
   /// within this share, so that a pair that starts closer together than the gap exerts no force at first.
   std::vector<std::pair<int, double>> ranges{};
@@ -102,7 +102,7 @@ struct ContactOptions
   /// [m/s] > 0. Friction holds like a spring (see FrictionSpring) until the slip exceeds this speed times the duration
   /// that begin() is given.
   double slip_speed = 1e-4;
-  /// [N] > 0: stiffness() never falls below it; a good choice is the weight of a piece
+  /// [N] > 0: the stiffness of barriers never falls below it; a good choice is the weight of a piece
   double least_stiffness = 1e-6;
 };
 

@@ -32,6 +32,10 @@ PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p);
 /// Radius [m] of the largest ball in a convex piece; infinite for a plane and for a triangle, which is a part of a
 /// mesh.
 double innerRadius(const ConvexPiece& piece);
+/// The part of a place p on a convex piece that rolling does not turn: from the centre of a sphere, or from the axis of
+/// a capsule or of the side of a cylinder, to the place. It is zero on other pieces. All in the frame of the piece [m];
+/// `normal`: of the contact, unit.
+Eigen::Vector3d roundPart(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& normal);
 /// What remains of a convex piece without the layer of this depth [m] below its surface. The depth must be less than
 /// innerRadius(). A plane and a triangle stay as they are.
 ConvexPiece withoutLayer(const ConvexPiece& piece, double depth);

@@ -16,11 +16,12 @@ namespace slender {
 /// pose is held with zero velocity. The slopes of the first and last sample are therefore zero, unless cutWithin() says
 /// that the samples are a part of a longer motion. Sparse (10..60 Hz) and jittery input thus reaches the rod without
 /// jumps of velocity. The three-point slope has two exceptions. Beside a sample with the same value the slope is zero,
-/// so that a pause stays a pause. Where one interval is shorter than a quarter of the other (a burst of late messages),
-/// the slope is that of the chord over both intervals, because noise of this chord does not grow as the interval gets
-/// short. Two equal samples on both sides of the turning point of a swing are not a pause: the accelerations before, at
-/// and after them then agree to within a third. q and -q are the same orientation. Between two samples the rotation
-/// takes the shorter way, so each half turn needs more than one sample.
+/// so that a pause stays a pause; each coordinate pauses on its own, unless expectMore() says that more samples come,
+/// because measured coordinates repeat by chance. Where one interval is shorter than a quarter of the other (a burst of
+/// late messages), the slope is that of the chord over both intervals, because noise of this chord does not grow as the
+/// interval gets short. Two equal samples on both sides of the turning point of a swing are not a pause: the
+/// accelerations before, at and after them then agree to within a third. q and -q are the same orientation. Between two
+/// samples the rotation takes the shorter way, so each half turn needs more than one sample.
 class PoseTrajectory : public SampledMotion<Pose>
 {
 public:
