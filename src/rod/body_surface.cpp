@@ -21,7 +21,9 @@ BodySurface capsule(double radius, double length)
 
 constexpr double kRounding = 1e-3;   // of the shortest side
 
-/// Bit k of the number of a corner tells on which side it is along axis k.
+/// Bit k of the number of a corner tells on which side it is along axis k. The diagonals of the faces connect four of
+/// the corners. So half a turn about the middle of a face maps its triangles, and those around it, to each other, and
+/// what presses evenly on a face does not turn the box.
 BodySurface facesOf(const Box& box)
 {
   BodySurface out;
@@ -35,8 +37,11 @@ BodySurface facesOf(const Box& box)
     for (int side = 0; side < 2; ++side)
     {
       const int first = side << k, u = 1 << (k + 1) % 3, v = 1 << (k + 2) % 3;
-      out.triangles.push_back({first, first | u, first | u | v});
-      out.triangles.push_back({first, first | u | v, first | v});
+      int corner[4] = {first, first | u, first | u | v, first | v};   // in turn
+      if (side == 1)
+        std::rotate(corner, corner + 1, corner + 4);
+      out.triangles.push_back({corner[0], corner[1], corner[2]});
+      out.triangles.push_back({corner[0], corner[2], corner[3]});
     }
   return out;
 }
@@ -46,7 +51,9 @@ BodySurface facesOf(const Cylinder& cylinder)
   BodySurface out;
   out.radius = kRounding * std::min(2.0 * cylinder.radius, cylinder.length);
   const int n = kSidesOfCylinder;
-  out.points.resize(3, 2 * n);
+  out.points.setZero(3, 2 * n + 2);   // the rims, and the middles of the ends
+  out.points(2, 2 * n + 1) = 0.5 * cylinder.length - out.radius;
+  out.points(2, 2 * n) = -out.points(2, 2 * n + 1);
   for (int i = 0; i < n; ++i)
   {
     const double angle = 2.0 * M_PI * i / n;
@@ -56,11 +63,8 @@ BodySurface facesOf(const Cylinder& cylinder)
     const int next = (i + 1) % n;
     out.triangles.push_back({i, next, n + next});
     out.triangles.push_back({i, n + next, n + i});
-    if (i > 0 && next > 0)
-    {
-      out.triangles.push_back({0, next, i});
-      out.triangles.push_back({n, n + i, n + next});
-    }
+    out.triangles.push_back({2 * n, next, i});
+    out.triangles.push_back({2 * n + 1, n + i, n + next});
   }
   return out;
 }

@@ -407,13 +407,12 @@ void ObjectIsland::end(WorldState& state) const
     return;
   for (const WorldObject* object : objects_)
     object->contact(state).barrier = {};
-  forParts([&](const WorldObject& object, std::size_t part) {   // Several strands keep the stiffest outermost layer.
+  forParts([&](const WorldObject& object, std::size_t part) {   // Several strands keep the stiffest of their barriers.
     BarrierLaw& barrier = object.contact(state).barrier;
     const BarrierLaw& own = island_.barrier(part);
-    if (barrier.layers[0].stiffness == 0.0)
+    const auto size = [](const BarrierLaw& law) { return std::make_pair(law.count(), law.layers[0].stiffness); };
+    if (barrier.layers[0].stiffness == 0.0 || size(barrier) < size(own))
       barrier = own;
-    else
-      barrier = {{{{1.0, std::max(own.layers[0].stiffness, barrier.layers[0].stiffness)}, {}, {}, {}, {}}}};
   });
   giveSprings(state);
 }

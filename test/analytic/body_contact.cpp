@@ -250,6 +250,33 @@ TEST(BodyContact, FastRollingNeedsNoShortSteps)
   }
 }
 
+/// Plates that close on a body press on it along their normals, and its friction keeps nothing that turns it.
+TEST(BodyContact, SqueezedBodiesFeelNoForceAcross)
+{
+  for (const char* shape : {"box: {size: [0.03, 0.03, 0.03]}", "cylinder: {radius: 0.015, length: 0.03}"})
+  {
+    std::ostringstream text;
+    text << "time: {step: 0.01, duration: 1}\ngravity: [0, 0, 0]\ncontact: {gap: 0.001}\nbodies:\n  - {name: body, "
+            "mass: "
+            "0.1, friction: 0.5, shape: {"
+         << shape << "}}\nobstacles:\n";
+    for (const int side : {-1, 1})
+      text << "  - {name: plate" << side + 1
+           << ", shape: {box: {size: [0.1, 0.1, 0.02]}}, friction: 0.5, motion: {table: "
+           << "[[0, 0, 0, " << side * 0.0271 << ", 1, 0, 0, 0], [0.2, 0, 0, " << side * 0.0251 << ", 1, 0, 0, 0]]}}\n";
+    Simulation s(parseScene(text.str()));
+    for (int k = 0; k < 100; ++k)
+    {
+      const StepReport report = s.step(s.defaultInputs());
+      ASSERT_TRUE(report.ok) << report.message;
+      const Vector3d force = s.world().contactLoads().obstacles[0].force;
+      if (k == 40)
+        EXPECT_LT(force.z(), -10.0) << shape;
+      EXPECT_LE(force.head<2>().norm(), 1e-6 * std::abs(force.z()) + 1e-9) << shape << " " << k;
+    }
+  }
+}
+
 /// The plane of a small face cuts a wide plate that is hardly tilted. Steps were refused because of it.
 TEST(BodyContact, ABoxStandsAnywhereOnAWidePlate)
 {
