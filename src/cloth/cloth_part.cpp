@@ -266,6 +266,8 @@ void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
     averages_->forEntries([&](Eigen::Index i, int point, double weight) {
       vertex(system().gradient(), point) -= weight * averages_->forces.col(i);
     });
+  if (with_hessian && held_end_)
+    addHeldMotion();
   if (coupled)
     return;
   addOwnContacts(with_hessian);

@@ -88,6 +88,7 @@ private:
   void placeHeld(double fraction) override;
   bool heldMoves(double from, double to) const override;
   void retreatHeld(double share) override;
+  void aimHeld(const Eigen::Matrix3Xd* x_end) override { held_end_ = x_end; }
   void gather(Eigen::Matrix3Xd& x) const override;
   void gatherStart(Eigen::Matrix3Xd& x) const override;
   void evaluate(bool with_hessian, const HessianShift& shift) override;
@@ -138,6 +139,7 @@ private:
   template <class Block>
   void addToBlocks(const int (&point)[4], Block&& block);
   void addOwnContacts(bool with_hessian);
+  void addHeldMotion();
   void factor(const HessianShift& shift);
   void allocate();
   bool solvesByFactors() const { return work_.linear->kind() == ClothSolver::cholesky && !linearized_; }
@@ -163,6 +165,7 @@ private:
   std::vector<double> inverse_length_;   ///< of edges at rest [1/m]
   PointVector base_, saved_, direction_, solution_;
   PointVector base_before_;                         ///< base_ before the last accept()
+  const Eigen::Matrix3Xd* held_end_ = nullptr;      ///< see aimHeld()
   bool moved_ = false;                              ///< the trial is a move from base_, and not base_ itself
   LinearOutcome outcome_ = LinearOutcome::solved;   ///< of the last solution with the own matrix
   StepReport counts_;                               ///< of linear equations that no report has yet

@@ -72,6 +72,30 @@ void ClothPart::addHessian(SharedMatrix& matrix, const HessianShift& shift)
           values[*entry] += factor * constant->values()[k];
 }
 
+/// Adds to the gradient what it changes, by the last Hessian, as held vertices go to held_end_.
+void ClothPart::addHeldMotion()
+{
+  PointVector& gradient = system().gradient();
+  const auto move = [&](int i) { return Eigen::Vector3d(held_end_->col(first_point + i) - vertex(base_, i)); };
+  const BlockMatrix& blocks = system().matrix();
+  for (int j = 0; j < points(); ++j)
+    for (int k = blocks.starts()[j]; k < blocks.starts()[j + 1]; ++k)
+    {
+      const int i = blocks.rows()[k];
+      const Eigen::Map<const Eigen::Matrix3d> block(blocks.values() + 9 * static_cast<std::size_t>(k));
+      if (isFree(i) && !isFree(j))
+        vertex(gradient, i) += block * move(j);
+      else if (!isFree(i) && isFree(j))
+        vertex(gradient, j) += block.transpose() * move(i);
+    }
+  const PointMatrix* constant = system().constantInBlocks() ? nullptr : system().constantMatrix();
+  const double factor = 1.0 + system().viscosity();
+  for (int i = 0; constant && i < points(); ++i)
+    for (int k = constant->starts()[i]; k < constant->starts()[i + 1]; ++k)
+      if (const int j = constant->column(k); isFree(i) && !isFree(j))
+        vertex(gradient, i) += factor * constant->values()[k] * move(j);
+}
+
 void ClothPart::addColumns(int point, int component, double weight, Columns& row) const
 {
   if (isFree(point))

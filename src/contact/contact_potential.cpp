@@ -393,18 +393,20 @@ void ContactPotential::begin(const Eigen::Matrix3Xd& x, const std::vector<Pose>&
   beginFollowing();   // The first friction replaces none, so that its change does not count as alternation.
 }
 
-void ContactPotential::pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end)
+void ContactPotential::pushTerms(const SurfaceMotion& motion)
 {
   // The terms of friction come after the normal ones and do not change, so that nothing is dragged along.
   for (std::size_t k = 0; k < found_.contacts.size(); ++k)
   {
     ContactTerm& term = found_.terms[k];
-    if (term.solid < 0 || surface_.solids[term.solid].body)
-      continue;
-    const Eigen::Vector3d motion =
-        solids_end[term.solid] * (solids[term.solid].inverse() * term.position) - term.position;
-    if (motion.dot(term.force) > 0.0)
-      term.force += term.stiffness * motion;
+    Eigen::Vector3d towards = Eigen::Vector3d::Zero();
+    if (const int solid = term.solid; solid >= 0 && !surface_.solids[solid].body)
+      towards = motion.solids_end[solid] * (motion.solids[solid].inverse() * term.position) - term.position;
+    for (int p = 0; p < 4; ++p)
+      if (const int i = term.point[p]; i >= 0)
+        towards -= term.moveBy(p, motion.x_end.col(i) - motion.x.col(i));
+    if (towards.dot(term.force) > 0.0)
+      term.force += term.stiffness * towards;
   }
 }
 

@@ -134,10 +134,10 @@ public:
                   const Eigen::VectorXd* turns = nullptr);
   const std::vector<ContactTerm>& terms() const { return found_.terms; }
   const std::vector<ContactRow>& rows() const { return found_.rows; }
-  /// Adds to the normal forces of terms() what they gain, to first order, when the solids that move as prescribed go
-  /// from `solids` to `solids_end`. Forces that would become smaller do not change. The last evaluate() must have
-  /// computed the stiffness of the terms.
-  void pushTerms(const std::vector<Pose>& solids, const std::vector<Pose>& solids_end);
+  /// Adds to the normal forces of terms() what they gain, to first order, in a motion of the points, and of the solids
+  /// that move as prescribed. Forces that would become smaller do not change. The last evaluate() must have computed
+  /// the stiffness of the terms.
+  void pushTerms(const SurfaceMotion& motion);
 
   /// Smallest softened gap of the last evaluate() [m]; infinity without contact.
   double smallestGap() const { return smallest_gap_; }

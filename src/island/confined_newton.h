@@ -32,16 +32,17 @@ constexpr double kFineGap = 1e-3;
 /// System offers what minimize() needs, and:
 /// - approach(from, to, reached): goes from the base towards the present trial, as far as nothing touches. That
 ///   becomes the base, where all that is prescribed stands at the fraction `reached`;
-/// - pushes(): whether something that is driven moves;
-/// - advance(to): puts what is held or driven, in the trial, where it is at `to`, and moves along what is pushed;
+/// - advance(from, to): puts what is held or driven, in the trial, where it is at `to`, or less far, and moves along
+///   what is pushed. Returns the fraction that it aims at;
 /// - resolve(tolerance, gap_tolerance): how incrementSize() measures, over the shortest edge and over the smallest gap;
 /// - lagFriction() and stiffen(converged): those of ContactPotential, after which what has changed is solved again;
 /// - contact(): the ContactPotential.
 template <class System>
 NewtonResult minimizeConfined(System& system, double from, double to, const NewtonConfig& newton, double gap)
 {
-  constexpr int kMaxApproaches = 200, kMaxIdle = 10, kQuickAdvances = 3, kMaxSolutions = 24, kMaxFailures = 8;
-  constexpr double kLeastAdvance = 1e-3, kFarAdvance = 0.2;   // of the way; less than the least is none
+  constexpr int kMaxApproaches = 200, kMaxIdle = 10, kMaxSolutions = 24, kMaxFailures = 8;
+  constexpr int kAdvances = 3;             // between two solutions
+  constexpr double kLeastAdvance = 1e-3;   // of the way; less is none
   NewtonResult total;
   const auto solve = [&](const NewtonConfig& config, double gap_tolerance) {
     system.resolve(config.tolerance, gap_tolerance);
@@ -60,40 +61,37 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
   };
   NewtonConfig fine = newton;
   fine.balances = false;   // What has converged has settled by then, and more solutions follow where contact changes.
-  NewtonConfig loose = fine, quick = fine;
+  NewtonConfig loose = fine;
   fine.tolerance = fineTolerance(newton, gap);
   fine.max_iterations = 2 * newton.max_iterations;   // contacts that come and go cost more than a substep cut in two
-  // Each advance of what pushes is an iteration as well, so that few are needed between two of them. Where many
-  // advances do not arrive, as in folds, each of them goes farther after a better solution.
   loose.tolerance = std::max(newton.tolerance, 0.02 * gap);
   loose.max_iterations = 12;
-  quick.tolerance = std::max(newton.tolerance, 0.5 * gap);
-  quick.max_iterations = 3;
   const double way = to - from;
-  const bool pushes = from < to && system.pushes();
+  double aim = to;
   for (int k = 0, idle = 0;; ++k)
   {
-    double reached = to;
+    double reached = aim;
     const bool stuck = k == kMaxApproaches || idle == kMaxIdle || stepsInterrupted();
-    const Approach approach = stuck ? Approach::squeezed : system.approach(from, to, reached);
+    const Approach approach = stuck ? Approach::squeezed : system.approach(from, aim, reached);
     if (approach == Approach::squeezed)
     {
       total.failure = StepFailure::squeezed;
       return total;
     }
-    if (approach == Approach::arrived)
+    if (approach == Approach::arrived && aim == to)
       break;
-    // A solution lets the blocking parts give way. After a far advance it is not needed, because the advance has
-    // already pushed them along.
-    const bool is_quick = pushes && k < kQuickAdvances;
-    if (!is_quick || reached - from < kFarAdvance * way)
-      system.stiffen(is_quick ? solve(quick, 1.0) : solve(loose, 0.1));
+    // An advance is an iteration of Newton's method, in which what is in the way moves along. A solution lets it give
+    // way where that does not suffice.
+    idle = reached - from < kLeastAdvance * way ? idle + 1 : 0;
+    if (idle > 0 || k % kAdvances == kAdvances - 1)
+      system.stiffen(solve(loose, 0.1));
     if (total.failure == StepFailure::work_exceeded)
       return total;
     system.accept();
-    idle = reached - from < kLeastAdvance * way ? idle + 1 : 0;
     from = reached;
-    system.advance(to);
+    aim = system.advance(from, to);
+    ++total.iterations;
+    ++total.factorizations;
   }
   for (int k = 0, failures = 0;; ++k)
   {

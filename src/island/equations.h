@@ -123,8 +123,7 @@ private:
   double slope() const;
   double noiseLevel() const;
   Approach approach(double from, double to, double& reached);
-  bool pushes() const { return solidsMove(); }
-  void advance(double to);
+  double advance(double from, double to);
   void resolve(double tolerance, double gap_tolerance) { tolerance_ = tolerance, gap_tolerance_ = gap_tolerance; }
   double lagFriction();
   bool stiffen(bool converged);
@@ -221,7 +220,7 @@ private:
   std::vector<char> group_moves_;   ///< whether a part of the group that has this name is not settled
   /// The last direction was computed without a shift, and parts that met nothing went all of it.
   bool by_newton_ = false, moved_fully_ = false;
-  bool pushing_ = false;   ///< contact exerts the forces that it will exert once solids are at poses_end_
+  bool pushing_ = false;   ///< contact exerts the forces that it will exert at points_end_ and poses_end_
   /// of increments: over the shortest edge, and at contacts over the smallest gap
   double tolerance_ = 0, gap_tolerance_ = 0;
   double moved_sticking_ = 0;            ///< the largest Part::moved_sticking

@@ -382,7 +382,7 @@ RodEvaluation Equations::evaluate(bool with_hessian, const HessianShift& shift)
     if (!std::isfinite(of_surfaces.potential))
       return of_surfaces;
     if (pushing_)
-      contact_->pushTerms(poses_, poses_end_);
+      contact_->pushTerms({points_, points_end_, poses_, poses_end_});
     if (attraction_)
       of_surfaces.potential += attraction_->evaluate(points_, with_hessian);
     take();

@@ -117,6 +117,9 @@ public:
   /// Whether anything that is prescribed moves between these fractions of the time step. If they are equal: whether the
   /// trial has it elsewhere than the base.
   virtual bool heldMoves(double, double) const { return false; }
+  /// The direction after the next evaluate(true) lets the part follow what is held, which goes from the base to x_end.
+  /// The columns of the part begin at first_point. nullptr: it stays.
+  virtual void aimHeld(const Eigen::Matrix3Xd*) {}
   /// Trial := base + share (trial - base) for what is held in the trial elsewhere than in the base, at one instant.
   virtual void retreatHeld(double) {}
   /// Puts into the trial what joints make the part follow, after all parts have moved.
