@@ -24,26 +24,27 @@ void ContactPotential::takeDisplacements(const Eigen::Matrix3Xd& x_end)
 }
 
 /// How deep [m] what moves straight may get into a solid before it counts as having passed through: half of the radius
-/// of the largest ball in the solid or in the body that the object belongs to, whichever is smaller. What slides around
-/// a solid, or rolls over it, gets less deep on straight ways, unless its step is long. It is infinite for pairs that
-/// are never examined: a plane, a body and its own solid, and a mesh and an object without a round body.
+/// of the ball in the solid or in the body that the object belongs to, whichever is smaller. What slides around a
+/// solid, or rolls over it, gets less deep on straight ways, unless its step is long. It is infinite for pairs that are
+/// never examined: those without a ball, and a body and its own solid.
 double ContactPotential::depthOfPassing(int object, int solid) const
 {
   const int carrier = surface_.objects[object].carrier;
-  const ConvexPiece& piece = solids_[solid].pieces.front();
-  if (carrier == solid || std::holds_alternative<Plane>(piece))
+  if (carrier == solid || std::holds_alternative<Plane>(solids_[solid].pieces.front()))
     return kInfinity;
-  return 0.5 * std::min(innerRadius(piece), carrier >= 0 ? innerRadius(solids_[carrier].pieces.front()) : kInfinity);
+  const auto radius = [&](int k) { return k >= 0 && solids_[k].ball > 0.0 ? solids_[k].ball : kInfinity; };
+  return 0.5 * std::min(radius(solid), radius(carrier));
 }
 
-/// Whether a piece of an object crosses the core of a solid. A triangle of a mesh has no inside: there the piece may
-/// come as near as its radius less the depth.
+/// Whether a piece of an object crosses the core of a solid. The core of a mesh is the ball in it. In a mesh without a
+/// ball, a piece may come as near to a triangle as its radius less the depth.
 bool ContactPotential::crossesCore(const SurfaceMotion& motion, const int* corner, int corners, int object, int solid,
                                    int piece, double radius) const
 {
   const double depth = depthOfPassing(object, solid);
-  const ConvexPiece& whole = solids_[solid].pieces[piece];
-  const bool hollow = std::holds_alternative<Triangle>(whole);
+  const SolidPieces& whole = solids_[solid];
+  const ConvexPiece& part = whole.pieces[piece];
+  const bool mesh = std::holds_alternative<Triangle>(part), hollow = mesh && !(whole.ball > 0.0);
   ApproachLimit limit;
   limit.thickness = hollow ? radius - depth : radius;
   limit.reach = 1e-3 * options_.gap;
@@ -52,8 +53,11 @@ bool ContactPotential::crossesCore(const SurfaceMotion& motion, const int* corne
   MovingPoint moving[3];
   for (int k = 0; k < corners; ++k)
     moving[k] = motion.of(corner[k]);
-  const double share =
-      faceSolidLimit(moving, corners, hollow ? whole : withoutLayer(whole, depth), rigid_[solid], limit);
+  const Pose middle{whole.middle, Eigen::Quaterniond::Identity()};
+  const double share = hollow ? faceSolidLimit(moving, corners, part, rigid_[solid], limit)
+                       : mesh ? faceSolidLimit(moving, corners, Sphere{whole.ball - depth},
+                                               {rigid_[solid].from * middle, rigid_[solid].at(1.0) * middle}, limit)
+                              : faceSolidLimit(moving, corners, withoutLayer(part, depth), rigid_[solid], limit);
   return share > 0.0 && share < 1.0;   // 0: the piece is there at the start.
 }
 

@@ -90,9 +90,14 @@ ContactPotential::ContactPotential(ContactSurface s, const ContactOptions& o)
                                                    shape->vertices.col(shape->triangles(1, i)),
                                                    shape->vertices.col(shape->triangles(2, i))});
             solids_[k].tree.emplace_back(*shape);
+            solids_[k].middle = shape->vertices.rowwise().mean();
+            solids_[k].ball = ballInMesh(*shape, solids_[k].middle);
           }
           else
+          {
             solids_[k].pieces.push_back(shape);
+            solids_[k].ball = std::is_same_v<T, Plane> ? 0.0 : innerRadius(shape);
+          }
         },
         surface_.solids[k].shape);
   }

@@ -146,6 +146,23 @@ double innerRadius(const ConvexPiece& piece)
   return std::numeric_limits<double>::infinity();
 }
 
+/// Seen from inside, the triangles of a closed mesh fill all directions: 4 pi [Van Oosterom and Strackee, The solid
+/// angle of a plane triangle, IEEE Trans. Biomed. Eng. 30, 1983].
+double ballInMesh(const TriangleMesh& mesh, const Eigen::Vector3d& middle)
+{
+  double angle = 0.0, radius = std::numeric_limits<double>::infinity();
+  for (Eigen::Index i = 0; i < mesh.triangles.cols(); ++i)
+  {
+    const auto corner = [&](int k) { return Eigen::Vector3d(mesh.vertices.col(mesh.triangles(k, i)) - middle); };
+    const Eigen::Vector3d a = corner(0), b = corner(1), c = corner(2);
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    angle += 2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + a.dot(c) * lb + b.dot(c) * la);
+    radius = std::min(radius, pointTriangleDistance(Eigen::Vector3d::Zero(), a, b, c));
+  }
+  constexpr double kRounding = 1e-6;
+  return std::abs(std::abs(angle) - 4.0 * M_PI) < kRounding ? radius : 0.0;
+}
+
 Eigen::Vector3d roundPart(const ConvexPiece& piece, const Eigen::Vector3d& p, const Eigen::Vector3d& normal)
 {
   constexpr double kSide = 0.5;   // sine of the angle to the side of a cylinder at which its end begins

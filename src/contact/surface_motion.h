@@ -16,6 +16,10 @@ struct SolidPieces
   std::vector<ConvexPiece> pieces;
   std::vector<MeshTree> tree;   ///< of a mesh: one; of other shapes: none
   double reach = 0.0;           ///< boundingRadius() [m]
+  /// A ball inside the solid, and its centre in the solid's frame [m]. Zero: none is known, as in a mesh that is open
+  /// or does not contain the mean of its vertices.
+  double ball = 0.0;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
 };
 
 /// A motion of the points and solids of a contact surface.

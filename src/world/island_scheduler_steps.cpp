@@ -213,9 +213,14 @@ void IslandScheduler::checkClearance(WorldState& state)
       pose.position.z() = world_.threads[index].model->floor.height;
     meeting.addSolid(solid.name(), solid.asTouched(objects_.all), pose);
   }
+  // Less than what rounding errors of positions leave, or barriers resolve, is no room.
+  const double rounding = 1e-11 * meeting.x.cwiseAbs().maxCoeff(), gap = world_.contact.gap,
+               least = std::max(1e-9 * gap, rounding);
+  if (gap <= rounding)
+    throw std::invalid_argument("contact.gap is " + shortNumber(gap, 3) +
+                                " m; must be larger than rounding errors of positions: at least " +
+                                shortNumber(100.0 * rounding, 3) + " m");
   const double room = ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses);
-  // Less than what rounding errors of positions leave, or barriers resolve, is none.
-  const double least = std::max(1e-9 * world_.contact.gap, 1e-11 * meeting.x.cwiseAbs().maxCoeff());
   if (!(room > least))
     throw std::invalid_argument(meeting.nearest(world_.contact) +
                                 (room < -least ? " cross by " + shortNumber(-1e3 * room, 4) + " mm" : " touch") +

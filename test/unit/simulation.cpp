@@ -434,6 +434,21 @@ TEST(Simulation, SaysWhereInTheFileARodCannotBeComposed)
   }
 }
 
+TEST(Simulation, AGapBelowRoundingErrorsIsNamed)
+{
+  try
+  {
+    Simulation(
+        parseScene("contact: {gap: 1e-12}\nbodies: [{name: ball, mass: 1, shape: {sphere: {radius: 0.1}}, pose: "
+                   "{position: [0, 0, 0.2]}}]\nobstacles: [{name: floor, shape: {plane: {}}}]"));
+    FAIL();
+  }
+  catch (const SceneError& error)
+  {
+    EXPECT_NE(std::string(error.what()).find("contact.gap is 1e-12 m"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Simulation, FormulationIsChosenWhereItApplies)
 {
   const auto build = [](const std::vector<std::string>& overrides) {

@@ -32,6 +32,9 @@ PieceDistance pieceDistance(const ConvexPiece& piece, const Eigen::Vector3d& p);
 /// Radius [m] of the largest ball in a convex piece; infinite for a plane and for a triangle, which is a part of a
 /// mesh.
 double innerRadius(const ConvexPiece& piece);
+/// Radius [m] of the ball about a point that reaches to the surface of a closed mesh around it. Zero if the point is
+/// outside, or if the mesh is open.
+double ballInMesh(const TriangleMesh& mesh, const Eigen::Vector3d& middle);
 /// The part of a place p on a convex piece that rolling does not turn: from the centre of a sphere, or from the axis of
 /// a capsule or of the side of a cylinder, to the place. It is zero on other pieces. All in the frame of the piece [m];
 /// `normal`: of the contact, unit.

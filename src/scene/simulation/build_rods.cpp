@@ -131,7 +131,19 @@ void addRod(SceneConfig& scene, int r, SceneParts& parts)
     parts.state.rod_guides.resize(scene.rods.size());
     placeOnGuide(scene, r, built.model, parts.state.rod_guides[r], initial, velocities);
   }
-  RodState state = startSceneRod(rod, built, initial);
+  RodState state;
+  try
+  {
+    state = startSceneRod(rod, built, initial);
+  }
+  catch (const std::invalid_argument& e)
+  {
+    if (!rod.tracking)
+      throw;
+    throw std::invalid_argument(std::string(e.what()) +
+                                " after `track` has moved it to the guide: give a centerline near the guide and about "
+                                "as long as it, or fewer test functions");
+  }
   if (velocities.cols() > 0)
     state.v = velocities;
   addGrasps(scene, r, built.model, state, parts.grasps);
