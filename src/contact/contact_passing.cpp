@@ -36,29 +36,34 @@ double ContactPotential::depthOfPassing(int object, int solid) const
   return 0.5 * std::min(radius(solid), radius(carrier));
 }
 
-/// Whether a piece of an object crosses the core of a solid. The core of a mesh is the ball in it. In a mesh without a
-/// ball, a piece may come as near to a triangle as its radius less the depth.
+/// Whether a piece of an object crosses the core of a solid. The core of a mesh is the ball in it. Besides, the surface
+/// of a round body may come as near to a triangle as its radius less half of the ball in the body.
 bool ContactPotential::crossesCore(const SurfaceMotion& motion, const int* corner, int corners, int object, int solid,
                                    int piece, double radius) const
 {
   const double depth = depthOfPassing(object, solid);
-  const SolidPieces& whole = solids_[solid];
-  const ConvexPiece& part = whole.pieces[piece];
-  const bool mesh = std::holds_alternative<Triangle>(part), hollow = mesh && !(whole.ball > 0.0);
-  ApproachLimit limit;
-  limit.thickness = hollow ? radius - depth : radius;
-  limit.reach = 1e-3 * options_.gap;
-  if (!std::isfinite(depth) || !(limit.thickness > 0.0))
+  if (!std::isfinite(depth))
     return false;
   MovingPoint moving[3];
   for (int k = 0; k < corners; ++k)
     moving[k] = motion.of(corner[k]);
+  const auto crosses = [&](const ConvexPiece& core, const RigidMotion& way, double thickness) {
+    ApproachLimit limit;
+    limit.thickness = thickness;
+    limit.reach = 1e-3 * options_.gap;
+    const double share = thickness > 0.0 ? faceSolidLimit(moving, corners, core, way, limit) : 1.0;
+    return share > 0.0 && share < 1.0;   // 0: the piece is there at the start.
+  };
+  const SolidPieces& whole = solids_[solid];
+  const ConvexPiece& part = whole.pieces[piece];
+  const RigidMotion& way = rigid_[solid];
+  if (!std::holds_alternative<Triangle>(part))
+    return crosses(withoutLayer(part, depth), way, radius);
+  const int carrier = surface_.objects[object].carrier;
+  const double of_body = carrier >= 0 ? solids_[carrier].ball : 0.0;
   const Pose middle{whole.middle, Eigen::Quaterniond::Identity()};
-  const double share = hollow ? faceSolidLimit(moving, corners, part, rigid_[solid], limit)
-                       : mesh ? faceSolidLimit(moving, corners, Sphere{whole.ball - depth},
-                                               {rigid_[solid].from * middle, rigid_[solid].at(1.0) * middle}, limit)
-                              : faceSolidLimit(moving, corners, withoutLayer(part, depth), rigid_[solid], limit);
-  return share > 0.0 && share < 1.0;   // 0: the piece is there at the start.
+  return (of_body > 0.0 && crosses(part, way, radius - 0.5 * of_body)) ||
+         (whole.ball > 0.0 && crosses(Sphere{whole.ball - depth}, {way.from * middle, way.at(1.0) * middle}, radius));
 }
 
 /// Returns whether anything has moved so far since begin() that passedThrough() has to examine it. What moves less

@@ -81,8 +81,7 @@ void Island::loadBarriers(double least)
       continue;
     BarrierRange range = parts_[k]->barrierRange(gap_);
     BarrierLaw law = barrier_[k];
-    if (parts_[k]
-            ->surfaceChanges())   // Pieces that are new may be very near to others. Barriers do not begin at such gaps.
+    if (parts_[k]->surfaceChanges())   // Barriers do not begin at the gaps of pieces that are new.
     {
       range.least = std::max(range.least, least);
       law.layers[0].stiffness =
