@@ -107,7 +107,7 @@ double ContactPotential::limitOf(const SurfaceMotion& m, const SheetCandidates::
   if (passes(on))
     return 1.0;
   ApproachLimit limit;
-  limit.thickness = thicknessOf(on);
+  limit.thickness = on.face.radius;
   limit.reach = rangeOf(on.face.object, on.solid) * options_.gap;
   MovingPoint corner[3];
   for (int k = 0; k < on.face.corners; ++k)
@@ -254,11 +254,13 @@ bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Po
   letPass(x, poses, x, poses);   // what presses on held points passes, also when the pieces are new
   near_.build(surface_, sheets_, solids_, {x, x, poses, poses},
               {options_.gap, margin_, margins_, kInfinity, 0.0, threads_});
-  for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
+  for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_})
     list->clear();
   for (const GridPairs::Pair& pair : near_.pairs())
   {
     const ContactSegment &a = surface_.segments[pair.first], &b = surface_.segments[pair.second];
+    if (!isStrand(a.object) && !isStrand(b.object))
+      continue;
     const double distance = segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b));
     const double scale = scaleOf(a, b);
     if (!fit(thin_pairs_, {pair.first, pair.second, 0}, distance, fullThickness(a, b, scale), scale))
@@ -266,9 +268,9 @@ bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Po
   }
   for (const Candidates::OnSolid& on : near_.onSolids())
   {
-    if (passes(on))
-      continue;
     const ContactSegment& s = surface_.segments[on.segment];
+    if (passes(on) || !isStrand(s.object))
+      continue;
     const Pose to_solid = poses[on.solid].inverse();
     const double distance =
         segmentPieceDistance(solids_[on.solid].pieces[on.piece], to_solid * Eigen::Vector3d(x.col(s.a)),
@@ -279,7 +281,7 @@ bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Po
   }
   std::sort(thin_pairs_.begin(), thin_pairs_.end());
   std::sort(thin_on_solids_.begin(), thin_on_solids_.end());
-  return sheets_.empty() || thinSheetsToFit(x, poses);
+  return sheets_.empty() || thinSheetsToFit(x);
 }
 
 double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)

@@ -117,7 +117,7 @@ void ContactPotential::setPieces(const ContactSurface& pieces)
   found_.clear();
   near_.clear();
   swept_.clear();
-  for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_, &thin_sheets_on_solids_})
+  for (auto* list : {&thin_pairs_, &thin_on_solids_, &thin_sheets_})
     list->clear();
 }
 

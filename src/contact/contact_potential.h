@@ -55,9 +55,9 @@ public:
   {
     surface_.solids[solid].ranges = ranges;
   }
-  /// Thins segments and triangles where others, or solids, are nearer than a twentieth of the gap, or overlap: to a
-  /// sixteenth of it. What was brought together by something else than motion (a division, growing radii) can so begin
-  /// a step. False: two centrelines or middle surfaces, or one and a solid, meet.
+  /// Thins strands of threads where other things are nearer than a twentieth of the gap, or overlap: to a sixteenth of
+  /// it. What was brought together by something else than motion (a division, growing radii) can so begin a step. All
+  /// other pairs keep their thickness. False: two centrelines, or one and a middle surface or a solid, meet.
   bool thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
   const ContactSurface& surface() const { return surface_; }
   /// Pairs of segments that thinToFit() found near each other: all those within the gap, and more. First and second are
@@ -316,13 +316,14 @@ private:
   /// Thins a pair at this distance if it has to be; `scale`: of its gap. False: the pieces meet.
   bool fit(std::vector<Thinned>& list, const std::array<int, 3>& key, double distance, double thickness,
            double scale = 1.0) const;
-  bool thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  bool thinSheetsToFit(const Eigen::Matrix3Xd& x);
   static double thinned(const std::vector<Thinned>& list, const std::array<int, 3>& key, double thickness);
   /// Share of thickness and gap that a pair of segments keeps, see contactShare().
   double scaleOf(const ContactSegment& a, const ContactSegment& b) const
   {
     return a.object == b.object ? contactShare(a, b, surface_.objects[a.object], options_.gap) : 1.0;
   }
+  bool isStrand(int object) const { return object >= 0 && surface_.objects[object].owner >= 0; }
   static double fullThickness(const ContactSegment& a, const ContactSegment& b, double scale)
   {
     return scale * (a.coreRadius() + b.coreRadius());
@@ -344,17 +345,9 @@ private:
     return on.face.driven != 0 && !surface_.solids[on.solid].body && held_.letPass(on.solid, true, on.face.index);
   }
   static std::array<int, 3> keyOf(const SheetCandidates::Pair& pair) { return {pair.edges, pair.first, pair.second}; }
-  static std::array<int, 3> keyOf(const SheetCandidates::OnSolid& on)
-  {
-    return {3 * on.solid + on.face.corners - 1, on.face.index, on.piece};
-  }
   double thicknessOf(const SheetCandidates::Pair& pair) const
   {
     return thin_sheets_.empty() ? pair.thickness : thinned(thin_sheets_, keyOf(pair), pair.thickness);
-  }
-  double thicknessOf(const SheetCandidates::OnSolid& on) const
-  {
-    return thin_sheets_on_solids_.empty() ? on.face.radius : thinned(thin_sheets_on_solids_, keyOf(on), on.face.radius);
   }
   /// Tells which movers may meet in a pair of pieces, or of a piece and a solid.
   struct Meeting
@@ -405,8 +398,8 @@ private:
   double smallest_gap_ = 0.0;
   bool following_ = false;   ///< see followFriction()
 
-  std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_, thin_sheets_on_solids_;   ///< sorted
-  std::vector<Contact> rubbing_;                                                             ///< for lagFriction()
+  std::vector<Thinned> thin_pairs_, thin_on_solids_, thin_sheets_;   ///< sorted
+  std::vector<Contact> rubbing_;                                     ///< for lagFriction()
   std::vector<PredictedForce> predicted_;   ///< if friction follows: one per contact, in their order
   int follows_left_ = 0;                    ///< how often friction may still follow before the next begin()
   /// The change that lagFriction() without prediction returned last, and the share of the change of each force that

@@ -71,7 +71,7 @@ bool ContactPotential::add(const Place& place, const SheetCandidates::OnSolid& o
   Eigen::Vector3d z[3];
   for (int k = 0; k < face.corners; ++k)
     z[k] = to_solid * Eigen::Vector3d(place.x.col(face.corner[k]) - pose.position);
-  const double radius = thicknessOf(on);
+  const double radius = face.radius;
   if (leastFaceDistance(piece, z, face.corners) >= radius + options_.gap)
     return true;
   PairGap gap = facePieceGap(z, face.corners, radius, piece);
@@ -96,10 +96,14 @@ bool ContactPotential::add(const Place& place, const SheetCandidates::OnSolid& o
   return addContact(place, gap, contact, rangeOf(face.object, on.solid), out);
 }
 
-bool ContactPotential::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+bool ContactPotential::thinSheetsToFit(const Eigen::Matrix3Xd& x)
 {
   for (const SheetCandidates::Pair& pair : near_.sheets().pairs())
   {
+    const int object = pair.edges ? sheets_.edges[pair.first].object : sheets_.points[pair.first].object,
+              other = pair.edges ? sheets_.edges[pair.second].object : surface_.triangles[pair.second].object;
+    if (!isStrand(object) && !isStrand(other))
+      continue;
     double distance;
     if (pair.edges)
     {
@@ -114,22 +118,7 @@ bool ContactPotential::thinSheetsToFit(const Eigen::Matrix3Xd& x, const std::vec
     if (!fit(thin_sheets_, keyOf(pair), distance, pair.thickness))
       return false;
   }
-  for (const SheetCandidates::OnSolid& on : near_.sheets().onSolids())
-  {
-    if (passes(on))
-      continue;
-    const Pose to_solid = poses[on.solid].inverse();
-    Eigen::Vector3d z[3];
-    for (int k = 0; k < on.face.corners; ++k)
-      z[k] = to_solid * Eigen::Vector3d(x.col(on.face.corner[k]));
-    FacePlane plane = separatingPlane(solids_[on.solid].pieces[on.piece], z, on.face.corners, on.face.radius);
-    if (plane.meets)
-      plane = separatingPlane(solids_[on.solid].pieces[on.piece], z, on.face.corners, 0.0);
-    if (!fit(thin_sheets_on_solids_, keyOf(on), plane.distance, on.face.radius))
-      return false;
-  }
   std::sort(thin_sheets_.begin(), thin_sheets_.end());
-  std::sort(thin_sheets_on_solids_.begin(), thin_sheets_on_solids_.end());
   return true;
 }
 

@@ -381,7 +381,6 @@ double ContactPotential::spin(const Contact& contact, const std::vector<Pose>& p
 
 void ContactPotential::keepSprings(const std::vector<Pose>& poses)
 {
-  const auto isStrand = [&](int object) { return object >= 0 && surface_.objects[object].owner >= 0; };
   springs_.clear();
   for (const Contact& contact : lagged_)
   {

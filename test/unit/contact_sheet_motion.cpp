@@ -298,13 +298,14 @@ TEST(ContactSheetMotion, WhatPressesOnHeldPointsMeetsNoNewPiece)
   const int held = 5;
   s.addSolid(Sphere{0.02}, {s.x.col(held), Eigen::Quaterniond::Identity()});
   ContactPotential potential = s.potential();
-  EXPECT_FALSE(potential.thinToFit(s.x, s.solids));
+  EXPECT_FALSE(std::isfinite(potential.evaluate(s.x, s.solids, false)));
   for (ContactTriangle& t : s.surface.triangles)
     for (int k = 0; k < 3; ++k)
       if (t.corner[k] == held)
         t.driven = static_cast<unsigned char>(t.driven | 1 << k);
   potential.setPieces(s.surface);
   EXPECT_TRUE(potential.thinToFit(s.x, s.solids));
+  EXPECT_TRUE(std::isfinite(potential.evaluate(s.x, s.solids, false)));
 }
 
 TEST(ContactSheetMotion, FallsOntoATable)
@@ -324,20 +325,25 @@ TEST(ContactSheetMotion, FallsOntoATable)
   EXPECT_NEAR(there.row(2).minCoeff(), 0.5 * kMotionThickness + 0.41 * kMotionGap, 0.03 * kMotionGap);
 }
 
-/// What something else than motion brought too near is thinned, and can begin a step.
-TEST(ContactSheetMotion, OverlapsAreThinned)
+/// Something else than motion may bring strands of threads too near to other things. They are thinned there, and can
+/// begin a step. Everything else keeps its thickness.
+TEST(ContactSheetMotion, OverlapsOfStrandsAreThinned)
 {
   Scene s;
   s.addCloth(gridMesh(0.1, 0.1, 2, 2, GridPattern::alternating), Vector::Zero(), Eigen::Quaterniond::Identity());
   s.addRod({-0.08, 0.01, 0.003}, {0.08, 0.02, 0.003}, 3);
-  s.addSolid(Sphere{0.02}, {{0.02, 0.02, -0.0215}, Eigen::Quaterniond::Identity()});
+  s.addSolid(Sphere{0.02}, {{0, 0.015, 0.0265}, Eigen::Quaterniond::Identity()});
+  ContactPotential rod = s.potential();
+  EXPECT_TRUE(rod.thinToFit(s.x, s.solids));
+  EXPECT_FALSE(std::isfinite(rod.evaluate(s.x, s.solids, false)));
+  s.surface.objects.back().owner = 0;
   ContactPotential p = s.potential();
   EXPECT_FALSE(std::isfinite(p.evaluate(s.x, s.solids, false)));
   ASSERT_TRUE(p.thinToFit(s.x, s.solids));
   EXPECT_TRUE(std::isfinite(p.evaluate(s.x, s.solids, false)));
   EXPECT_GT(p.evaluate(s.x, s.solids, false), 0.0);
   EXPECT_GT(p.stepLimit(s.x, s.x.colwise() + Vector(0, 0, 1e-4), s.solids, s.solids), 0.0);
-  s.solids[0].position.z() = 0.0;
+  s.solids[0].position.z() = 0.003;
   EXPECT_FALSE(p.thinToFit(s.x, s.solids));
 }
 
