@@ -56,7 +56,7 @@ bool ClothStepper::Impl::respond(const Eigen::Matrix3Xd& forces, double duration
 double ClothStepper::Impl::inertia(int vertex, double h) const
 {
   double air = 0.0;   // Loads of explicit steps have no stiffness.
-  if (!averages)      // With averages, air is left out, because their matrix would be factored in each step.
+  if (!averages)      // With averages, the factored matrix has to serve many steps. So it lacks the air.
     for (const auto& load : system->loads())
       air += h * h * load->stiffness(vertex).norm();
   const double damping = options.integrator == Integrator::symplectic_euler ? 0.0 : h * model->mass_damping;

@@ -181,7 +181,7 @@ private:
     /// Of its spring: force where the step begins, and in the last evaluation.
     Eigen::Vector3d tension_begin = Eigen::Vector3d::Zero(), tension = Eigen::Vector3d::Zero();
     Eigen::Vector3d own = Eigen::Vector3d::Zero();   ///< with a carrier: the position in its frame
-    /// roundPart() of the solid and of the carrier, world. `material` and `own` lack it once they are set.
+    /// roundPart() of the solid and of the carrier, world. Then `material` and `own` do not contain it.
     Eigen::Vector3d round = own, own_round = own;
     int first_points = 2;                              ///< how many of the points belong to the first piece
     std::array<ContactTerm::Turn, 2> turn{};           ///< of friction
@@ -200,7 +200,8 @@ private:
     double gap, share;         ///< the gap [m], and its ratio to the gap at which the pair repels
     double force, stiffness;   ///< normal force, and stiffness of the barrier [N]
   };
-  /// Two objects (`other` is -1 for a solid) that are within the gap, and the ratio of their distance to it.
+  /// Two objects that are nearer to each other than the gap, and the ratio of their distance to the gap. If the second
+  /// one is a solid, `other` is -1.
   struct Near
   {
     int object, other;

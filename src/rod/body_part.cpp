@@ -187,7 +187,7 @@ void BodyPart::begin(const RigidBodyState& state, const Eigen::Vector3d& step_gr
   gravity = step_gravity;
 }
 
-/// Friction knows the turn of a body in a substep only if it is less than half a turn.
+/// Friction needs the turn of a body in a substep. Two poses tell it only if it is less than half a turn.
 double BodyPart::longestSubstep(double duration) const
 {
   constexpr double kMostTurn = 2.0;   // [rad]
