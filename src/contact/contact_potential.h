@@ -99,6 +99,8 @@ public:
   /// limited number of times after begin(), because a minimisation might not end otherwise. beginSolution() forgets the
   /// directions before.
   void followFriction(const std::vector<Eigen::Vector3d>& moves);
+  /// The next evaluate() leaves the normal forces of friction as they are.
+  void stopFollowing() { following_ = false; }
   /// The springs of friction where a step begins, in ascending order and one per pair. Strands of
   /// threads have none, because their pieces change.
   const std::vector<FrictionSpring>& springs() const { return springs_; }

@@ -350,6 +350,7 @@ bool Equations::sticksAfter(double rate) const
 }
 
 /// Measures how far the direction moves touching surfaces relative to each other. Unless that is far, friction follows.
+/// With a shift of positions the direction is not that of Newton's method, so that it does not predict forces.
 void Equations::measureContacts()
 {
   moves_.clear();
@@ -379,7 +380,10 @@ void Equations::measureContacts()
       first.moved_sticking = std::max(first.moved_sticking, u.norm() / term.slip_range);
     moved_sticking_ = std::max(moved_sticking_, first.moved_sticking);
   }
-  contact_->followFriction(moves_);
+  if (shift_.position == 0.0)
+    contact_->followFriction(moves_);
+  else
+    contact_->stopFollowing();
 }
 
 double Equations::slope() const

@@ -11,17 +11,25 @@ namespace slender {
 struct HessianShift
 {
   double position = 0.0, angle = 0.0;
+  double last = 0.0;   ///< the last shift of positions with which the Hessian was definite; 0: none yet
 
   bool none() const { return position == 0.0 && angle == 0.0; }
+  /// Begins with the shift that was enough before. While a body buckles, many iterations in a row need one.
   void raise()
   {
-    position = angle < 5.0 ? 0.0 : position > 0.0 ? 10.0 * position : 0.1;
-    angle = angle < 0.5 ? 1.0 : 10.0;
+    constexpr double kFirst = 0.1, kMostAngle = 10.0;
+    if (position > 0.0)
+      position *= 10.0;
+    else if (last > 0.0 || angle >= 0.5 * kMostAngle)
+      position = last > 0.0 ? last : kFirst;
+    angle = angle < 0.5 && position == 0.0 ? 1.0 : kMostAngle;
   }
-  /// What to try after a successful iteration.
+  /// What to try after a successful iteration. A shift that is larger than needed makes increments small.
   void relax()
   {
-    position = position > 1e-2 ? 0.1 * position : 0.0;
+    constexpr double kLeast = 1e-5;
+    last = position > 0.0 ? position : last;
+    position = position > 2.0 * kLeast ? 0.1 * position : 0.0;
     angle = position > 0.0 ? angle : angle > 0.1 ? 0.3 * angle : 0.0;
   }
 };

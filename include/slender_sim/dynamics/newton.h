@@ -21,9 +21,9 @@ struct NewtonResult
   bool ok() const { return failure == StepFailure::none; }
 };
 
-/// 1 + t.t' below which a trial is refused: consecutive tangents within about 3 degrees of opposite. There the discrete
-/// curvature 2 tan(phi/2) has grown to 40 and parallel transport is about to become undefined.
-constexpr double kFoldedChi = 1.5e-3;
+/// 1 + t.t' below which a trial is refused: consecutive tangents within about 1.8 degrees of opposite. There the
+/// discrete curvature 2 tan(phi/2) has grown to 126 and parallel transport is about to become undefined.
+constexpr double kFoldedChi = 5e-4;
 
 /// Returns whether a full step of this increment ends Newton's method. So it does if the increment after it would be
 /// within the tolerance, by the rate at which increments shrink [Hairer and Wanner, Solving Ordinary Differential

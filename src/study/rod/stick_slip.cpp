@@ -91,13 +91,14 @@ void runStickSlip(StudyContext& context)
   Plot& plot = context.plot("stick_slip", "Pressed strip: horizontal over vertical force until the foot slips",
                             "compression / L", "|Fx| / N");
   plot.log_x = plot.log_y = false;
-  const std::vector<int> meshes = context.quick() ? std::vector<int>{40} : std::vector<int>{40, 80};
+  constexpr int kMeshes[] = {40, 80};
   int done = 0;
-  for (const int edges : meshes)
+  for (const int edges : kMeshes)
     for (std::size_t k = 0; k < std::size(kSlips); ++k)
     {
       const Slip& slip = kSlips[k];
-      context.progress(done++, static_cast<int>(meshes.size() * std::size(kSlips)), "mu = " + std::to_string(slip.mu));
+      context.progress(done++, static_cast<int>(std::size(kMeshes) * std::size(kSlips)),
+                       "mu = " + std::to_string(slip.mu));
       const PressedRod r = press(edges, slip);
       // the coefficient that belongs to the measured compression, by the table's local power law
       const Slip &a = kSlips[k > 0 ? k - 1 : 0], &b = kSlips[k > 0 ? k : 1];
@@ -108,7 +109,7 @@ void runStickSlip(StudyContext& context)
           .set("compression", r.compression)
           .set("expected_compression", slip.compression)
           .check(mu, slip.mu, 0.01 * slip.mu, "stickslip_inverse.csv: mu at the compression of the first slip");
-      if (edges != meshes.front())
+      if (edges != kMeshes[0])
         continue;
       Series& series = plot.at("mu = " + std::to_string(slip.mu).substr(0, 4));
       series.x = r.compressions;
