@@ -31,12 +31,14 @@ void IslandScheduler::checkIntegrator() const
   const bool touching = any(objects_.cloths, touches) || any(objects_.rods, touches) || any(objects_.bodies, touches);
   const bool touching_threads = any(objects_.threads, touches);
   const bool may_join = touching || any(world_.bodies, [](const auto& body) { return body.shape.has_value(); });
-  if (world_.time.integrator == Integrator::symplectic_euler && simulates &&
-      (touching || (touching_threads && may_join)))
-    throw std::invalid_argument(
-        "symplectic_euler takes no contact, whose forces are too stiff for explicit steps: take implicit_euler, bdf2 "
-        "or tr_bdf2 (time.integrator)");
-  if (touching_threads && simulates && may_join && world_.time.integrator != Integrator::implicit_euler)
+  const Integrator integrator = world_.time.integrator;
+  const bool takes_contact = integrator == Integrator::implicit_euler || integrator == Integrator::bdf2 ||
+                             integrator == Integrator::tr_bdf2;
+  if (!takes_contact && simulates && (touching || (touching_threads && may_join)))
+    throw std::invalid_argument(std::string(toString(integrator)) +
+                                " takes no contact, because it does not damp stiff forces: take implicit_euler, bdf2 "
+                                "or tr_bdf2 (time.integrator)");
+  if (touching_threads && simulates && may_join && integrator != Integrator::implicit_euler)
     throw std::invalid_argument(
         "threads that touch other objects are stepped together with them, by implicit Euler: set time.integrator: "
         "implicit_euler");

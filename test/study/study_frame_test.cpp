@@ -65,7 +65,7 @@ TEST(StudyFrame, scenesWithFoldsAndRimsHold)
   const Study* study = findStudy("coupled_safety");
   ASSERT_TRUE(study);
   StudyContext context(study->name, true, false);
-  context.choose({417, 469, 772, 881});
+  context.choose({56, 352, 417, 469, 569, 772, 881});
   study->run(context);
   for (const char* name : {"penetrations", "thickness_violations", "refused"})
     EXPECT_EQ(metric(context, name), 0.0) << name;

@@ -53,6 +53,27 @@ struct Course
   World world;
 };
 
+TEST(World, TakesContactWithIntegratorsThatDampStiffForces)
+{
+  const Rod rod = straightRod(20, 1.0, roundSection(0.005, 1e6, 1000));
+  WorldModel world = model(rod, true);
+  world.rods[0].contact = ContactProperties{};
+  world.contact.gap = 1e-3;
+  WorldState state;
+  state.rods = {rod.state};
+  for (const Integrator taken : {Integrator::implicit_euler, Integrator::bdf2, Integrator::tr_bdf2})
+  {
+    world.time.integrator = taken;
+    EXPECT_NO_THROW(World(world, state));
+  }
+  for (const Integrator refused :
+       {Integrator::symplectic_euler, Integrator::implicit_midpoint, Integrator::generalized_alpha})
+  {
+    world.time.integrator = refused;
+    EXPECT_THROW(World(world, state), std::invalid_argument);
+  }
+}
+
 TEST(World, ARodOnItsOwnMovesAsWithoutAWorld)
 {
   Rod rod = straightRod(20, 1.0, roundSection(0.005, 1e6, 1000));
