@@ -12,6 +12,7 @@ namespace slender {
 namespace {
 
 constexpr double kNear = 0.1;             ///< increment, over the shortest edge, below which the exact Hessian is taken
+constexpr double kSemidefinite = 5e-3;    ///< shift of positions from which on the Hessian is semidefinite
 constexpr double kShiftOfAngle = 0.2;     ///< of the weight of inertia, per unit of a shift of angles
 constexpr double kFirstShift = 1e-3;      ///< of all vertices in statics, per unit of a shift of angles
 constexpr int kTimesWork = 5;             ///< of a step in an island, over that of a cloth alone
@@ -250,7 +251,7 @@ void ClothPart::gatherStart(Eigen::Matrix3Xd& x) const { x.middleCols(first_poin
 void ClothPart::evaluate(bool with_hessian, const HessianShift& shift)
 {
   const bool statics = statics_rate_ > 0.0;
-  exact_ = statics || (near_ && shift.position == 0.0 && !linearized_);
+  exact_ = statics || (near_ && shift.position < kSemidefinite && !linearized_);
   const HessianKind kind = exact_ ? HessianKind::exact : HessianKind::semidefinite;
   const PointVector* const from = linearized_ || statics ? nullptr : moved_ ? &base_ : &base_before_;
   const ClothEvaluation e = with_hessian ? system().evaluateHessian(work_.x, kind, from) : system().evaluate(work_.x);

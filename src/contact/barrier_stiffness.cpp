@@ -90,7 +90,8 @@ void BarrierStiffness::unloadInnerLayers(const Barrier& barrier, double h)
   for (int k = 1; k < law_.count(); ++k)
     inner += forceOf(law_.layers[static_cast<std::size_t>(k)]);
   BarrierLayer& outer = law_.layers[0];
-  const double taken = std::min(kRate * h, kMostGrowth) * forceOf(outer);
+  const double growth = std::min({kRate * h, kMostGrowth, range_.most / outer.stiffness - 1.0}),
+               taken = growth * forceOf(outer);
   if (!(inner > 0.0) || !(taken > 0.0))
     return;
   const double kept = std::max(0.0, 1.0 - taken / inner);

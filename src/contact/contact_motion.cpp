@@ -284,7 +284,7 @@ bool ContactPotential::thinToFit(const Eigen::Matrix3Xd& x, const std::vector<Po
   return sheets_.empty() || thinSheetsToFit(x);
 }
 
-double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses)
+double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& poses, bool strands)
 {
   check(x, poses);
   double least = options_.gap;
@@ -307,6 +307,8 @@ double ContactPotential::clearance(const Eigen::Matrix3Xd& x, const std::vector<
       const double scale = scaleOf(a, b);
       const bool counts =
           !(a.prescribed() && b.prescribed()) && scale > 0.0 && (a.object == b.object ? c.self : c.others && d.others);
+      if (!strands && isStrand(a.object) && isStrand(b.object))
+        continue;
       if (counts && boxes_[order_[p]].overlaps(boxes_[order_[q]]))
         least = std::min(least,
                          segmentDistance(x.col(a.a), x.col(a.b), x.col(b.a), x.col(b.b)) - fullThickness(a, b, scale));

@@ -68,7 +68,8 @@ public:
   /// they meet. Triangles that an edge passes through meet it. If a piece has held points, only its free corners and
   /// the edges between them count against solids that move as prescribed. Shares no search structure and no
   /// minimisation with the rest of this class. The surface of a mesh is touched from both sides.
-  double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids);
+  /// `strands`: whether strands of threads count against each other, which may overlap while they flow.
+  double clearance(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool strands = true);
 
   /// A time step of h seconds begins here: tangential displacements of friction count from this configuration, and its
   /// normal forces and tangent planes are those of friction until lagFriction(). Nothing else is carried over from

@@ -94,7 +94,10 @@ double ContactPotential::addFriction(const Place& place, const Eigen::VectorXd* 
   const std::vector<Pose>& poses = place.poses;
   const double normal_force = contact.force.norm(), most = contact.friction * normal_force;
   if (!(most > 0.0))
+  {
+    contact.tension.setZero();
     return 0.0;
+  }
   ContactTerm& term = addTerm(contact, out);
   Eigen::Vector3d u = Eigen::Vector3d::Zero();
   const int carrier = surface_.objects[contact.object].carrier;
@@ -348,6 +351,8 @@ FrictionSpring ContactPotential::springOf(const Contact& contact) const
   spring.solid = contact.solid;
   if (contact.solid >= 0)
     spring.piece = static_cast<int>(contact.second & 0xffffffff);
+  else if (contact.first_points == 1)
+    spring.piece = 1;   // A point and a triangle may have the numbers of two edges.
   const auto [first, second] = std::minmax({surface_.objects[contact.object].first_point,
                                             surface_.objects[std::max(contact.object, contact.other)].first_point});
   for (int k = 0; k < 4; ++k)

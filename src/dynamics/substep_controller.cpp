@@ -54,7 +54,7 @@ void SubstepController::run(SubstepEquations& equations, double duration, StepRe
     if (inaccurate)
     {
       countWork(result, report);
-      h = length * std::clamp(lengthFactor(ratio), 0.2, 0.8);
+      h = std::max(length * std::clamp(lengthFactor(ratio), 0.2, 0.8), rule_.min_step);
       continue;
     }
     if (failed)

@@ -83,11 +83,13 @@ NewtonResult minimizeConfined(System& system, double from, double to, const Newt
     // An advance is an iteration of Newton's method, in which what is in the way moves along. A solution lets it give
     // way where that does not suffice.
     idle = reached - from < kLeastAdvance * way ? idle + 1 : 0;
-    if (idle > 0 || k % kAdvances == kAdvances - 1)
+    if (idle > 0 || way == 0.0 || k % kAdvances == kAdvances - 1)
+    {
       system.stiffen(solve(loose, 0.1));
-    if (total.failure == StepFailure::work_exceeded)
-      return total;
-    system.accept();
+      if (total.failure == StepFailure::work_exceeded)
+        return total;
+      system.accept();
+    }
     from = reached;
     aim = system.advance(from, to);
     ++total.iterations;

@@ -18,9 +18,9 @@ bool Equations::moves(const IslandSolid& s)
 }
 
 /// Puts what is prescribed, in the trial, where it is at the fraction `to`, or less far. What driven solids and held
-/// points touch, and what holds on to them, moves along by one step of Newton's method. Without this prediction,
-/// contact would block the way after a part of the gap. Returns the fraction: if edges would turn too far, everything
-/// goes the share of the way at which they do not.
+/// points touch, and cloth that is held, moves along by one step of Newton's method. Without this prediction, contact
+/// would block the way after a part of the gap. Returns the fraction: if edges would turn too far, everything goes the
+/// share of the way at which they do not.
 double Equations::advance(double from, double to)
 {
   if (solidsMove() || std::any_of(parts_.begin(), parts_.end(), [&](Part* part) { return part->heldMoves(from, to); }))
@@ -47,6 +47,7 @@ double Equations::advance(double from, double to)
       for (const Part* part : parts_)
         if (!part->settled)
           alpha = std::min(alpha, part->stepLimit());
+      contact_->stopFollowing();   // The direction does not contain what is prescribed.
       forParts([&](Part& part) { part.moveAlong(alpha); });
       to = alpha < 1.0 ? from + alpha * (to - from) : to;
     }

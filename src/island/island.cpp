@@ -198,7 +198,11 @@ StepFailure Island::solveSubstep(const Substep& substep, StepReport& report)
     startAccelerations();
   equations_.beginSubstep(substep.from / duration_);
   if (!loadContact(substep.length))
+  {
+    const auto changed = std::find_if(parts_.begin(), parts_.end(), [](Part* part) { return part->surfaceChanges(); });
+    failed_ = static_cast<std::size_t>(changed - parts_.begin());
     return StepFailure::squeezed;
+  }
   for (std::size_t s = 0; s < plan_.stages.size(); ++s)
   {
     const NewtonResult newton = solveStage(s, substep);

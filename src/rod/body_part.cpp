@@ -177,6 +177,13 @@ double BodyPart::residual() const
                   system.gradient.tail<3>().lpNorm<Eigen::Infinity>() * std::sqrt(m.mass / m.inertia.trace()));
 }
 
+Largest BodyPart::unbalancedForce() const
+{
+  Largest force;
+  force.add(0, residual());
+  return force;
+}
+
 double BodyPart::forceScale() const { return system.model().mass * gravity.norm() + system.model().force.norm(); }
 
 // ---- steps
@@ -259,10 +266,11 @@ void BodyPart::endStage(std::size_t stage, bool last, StepReport& report)
     return;
   system.finishStep(*plan_, next_);
   next_.last_step = length_;
-  const double gyration = std::sqrt(0.5 * system.model().inertia.trace() / system.model().mass);
   report.error_estimate =
-      std::max(report.error_estimate, system.localError(*plan_, length_, std::max(reach_, gyration), next_));
+      std::max(report.error_estimate, system.localError(*plan_, length_, std::max(reach_, gyration()), next_));
 }
+
+double BodyPart::gyration() const { return std::sqrt(0.5 * system.model().inertia.trace() / system.model().mass); }
 
 double BodyPart::energyOf(const RigidBodyState& s) const
 {
@@ -272,18 +280,24 @@ double BodyPart::energyOf(const RigidBodyState& s) const
          (m.gravity ? m.mass * gravity.dot(s.X_WB.position) : 0.0);
 }
 
+/// The energy of the position depends on the origin of coordinates, so that the growth that is allowed does not contain
+/// it.
 double BodyPart::energyAtStart(double& allowance)
 {
+  const RigidBodyModel& m = system.model();
+  const Eigen::Vector3d force = m.force + (m.gravity ? Eigen::Vector3d(m.mass * gravity) : Eigen::Vector3d::Zero());
   const double energy = energyOf(now_);
-  allowance += 0.05 * std::abs(energy);
+  allowance += 0.05 * (energy + force.dot(now_.X_WB.position) + force.norm() * gyration());
   return energy;
 }
 
 void BodyPart::refuse(StepFailure failure, double length, StepReport& report) const
 {
   const bool squeezed = failure == StepFailure::squeezed;
-  report.refuse(failure, "body '" + system.model().name +
-                             "': " + (squeezed ? "what it touches leaves it no room" : "its motion was not found") +
+  report.refuse(failure, "body '" + system.model().name + "': " +
+                             (squeezed                              ? "what it touches leaves it no room"
+                              : failure == StepFailure::energy_grew ? "energy of the parts that it is stepped with grew"
+                                                                    : "its motion was not found") +
                              " at a step of " + milliseconds(length) + ": use a shorter step" +
                              (squeezed ? ", or slow down what is driven" : ""));
 }

@@ -115,7 +115,8 @@ private:
   void beginStage(std::size_t stage) override;
   void endStage(std::size_t stage, bool last, StepReport& report) override;
   void acceptSubstep(const Substep&) override { std::swap(now_, next_); }
-  bool conserves() const override { return true; }
+  bool conserves() const override { return system.model().torque.isZero(0.0); }
+  Largest unbalancedForce() const override;
   double energyAtStart(double& allowance) override;
   double energyAtEnd() const override { return energyOf(next_); }
   void refuse(StepFailure failure, double length, StepReport& report) const override;
@@ -139,6 +140,7 @@ private:
   void forCarried(const Do& apply) const;
   void compose();
   void addForces(Eigen::Vector3d& force, Eigen::Vector3d& torque) const;
+  double gyration() const;   ///< radius of gyration [m]
   void damp(double h, Eigen::Vector3d& momentum);
   StepFailure place(const ProjectedBody& whole);
 

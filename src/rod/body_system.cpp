@@ -194,6 +194,8 @@ void BodySystem::evaluate(bool with_hessian)
   energy_ = 0.5 * weight_ * d.squaredNorm() +
             0.5 * rotation_weight_ * (difference * moment_ * difference.transpose()).trace() -
             force_.dot(pose.position);
+  if (!model_.torque.isZero(0.0))
+    energy_ -= model_.torque.dot(turnFromStart());
   // -tr(R^ J R^T exp(-[turn])) to second order in the turn
   const Eigen::Matrix3d c = rotation_target_ * moment_ * r.transpose();
   gradient.head<3>() = weight_ * d - force_;

@@ -56,14 +56,7 @@ private:
         f(weld, g);
   }
 
-  /// Whether friction turns the rod about its tangents. It does not with methods whose stage lies inside the step,
-  /// because these relax the frames at the end of the step, which removes spins.
-  bool turns() const
-  {
-    const Integrator integrator = rod_.time.integrator;
-    return touches_ && contact_.friction > 0.0 && integrator != Integrator::implicit_midpoint &&
-           integrator != Integrator::generalized_alpha && !isExplicit(integrator);
-  }
+  bool turns() const { return touches_ && contact_.friction > 0.0; }   ///< Friction turns the rod about its tangents.
 
   // ---- as Part
   int nodeOf(int point) const override { return point; }

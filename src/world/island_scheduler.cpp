@@ -32,8 +32,8 @@ void IslandScheduler::checkIntegrator() const
   const bool touching_threads = any(objects_.threads, touches);
   const bool may_join = touching || any(world_.bodies, [](const auto& body) { return body.shape.has_value(); });
   const Integrator integrator = world_.time.integrator;
-  const bool takes_contact = integrator == Integrator::implicit_euler || integrator == Integrator::bdf2 ||
-                             integrator == Integrator::tr_bdf2;
+  const bool takes_contact =
+      integrator == Integrator::implicit_euler || integrator == Integrator::bdf2 || integrator == Integrator::tr_bdf2;
   if (!takes_contact && simulates && (touching || (touching_threads && may_join)))
     throw std::invalid_argument(std::string(toString(integrator)) +
                                 " takes no contact, because it does not damp stiff forces: take implicit_euler, bdf2 "

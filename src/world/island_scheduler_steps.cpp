@@ -220,7 +220,8 @@ void IslandScheduler::checkClearance(WorldState& state)
     throw std::invalid_argument("contact.gap is " + shortNumber(gap, 3) +
                                 " m; must be larger than rounding errors of positions: at least " +
                                 shortNumber(100.0 * rounding, 3) + " m");
-  const double room = ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses);
+  const double room =
+      ContactPotential(meeting.surface, world_.contact).clearance(meeting.x, meeting.poses, state.steps == 0);
   if (!(room > least))
     throw std::invalid_argument(meeting.nearest(world_.contact) +
                                 (room < -least ? " cross by " + shortNumber(-1e3 * room, 4) + " mm" : " touch") +

@@ -206,8 +206,6 @@ int ObjectIsland::numberOf(const ObjectRef& partner) const
 /// Tells contact which solids the bodies repel within a share of the gap only.
 void ObjectIsland::takeRanges(WorldState& state)
 {
-  if (!contact())
-    return;
   ranges_.resize(solids_.size());
   for (auto& list : ranges_)
     list.clear();
@@ -224,8 +222,6 @@ void ObjectIsland::takeRanges(WorldState& state)
 void ObjectIsland::takeSprings(WorldState& state)
 {
   island_.springs.clear();
-  if (!contact())
-    return;
   for (std::size_t k = 0; k < surfaces_.size(); ++k)
     for (const ContactSpring& spring : surfaces_[k]->contact(state).springs)
     {

@@ -198,7 +198,8 @@ bool WorldStatics::settle(double h)
     }
     ++report_.substeps;
     force_scale_ = std::max(force_scale_, equations().forceScale());
-    report_.residual = unbalanced(h) / force_scale_;
+    const double force = unbalanced(h);
+    report_.residual = force == 0.0 ? 0.0 : force / force_scale_;
     report_.max_strain = report.max_strain;
     if (round > 0 && report_.residual < kUnbalanced)
     {

@@ -5,9 +5,9 @@ namespace slender {
 /// Multiples of positive diagonals added to a Hessian that is not definite: on massless unknowns (edge angles) and on
 /// positions.
 ///
-/// Angles come first. The averaged material curvature (3.14) makes the angle block of a sharply kinked joint (turn
-/// above about 80 degrees) indefinite while positions are well determined by their inertia; shifting only the angles
-/// keeps Newton's fast convergence there.
+/// Angles come first, unless positions have needed a shift before. The averaged material curvature (3.14) makes the
+/// angle block of a sharply kinked joint (turn above about 80 degrees) indefinite while positions are well determined
+/// by their inertia; shifting only the angles keeps Newton's fast convergence there.
 struct HessianShift
 {
   double position = 0.0, angle = 0.0;

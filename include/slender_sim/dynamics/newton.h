@@ -17,7 +17,6 @@ struct NewtonResult
   int iterations = 0, factorizations = 0;
   double residual = 0.0;   ///< unbalanced force over the force scale [-]
   double max_strain = 0.0;
-  bool definite = true;   ///< the last Hessian was positive definite without a shift
   bool ok() const { return failure == StepFailure::none; }
 };
 
@@ -116,7 +115,6 @@ NewtonResult minimize(System& system, const NewtonConfig& config)
       trial = system.evaluate(true, shift);
       ++result.factorizations;
     }
-    result.definite = shift.none();
     system.solve();
     ++result.iterations;
 

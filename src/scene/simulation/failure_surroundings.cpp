@@ -54,6 +54,7 @@ public:
     object_ = place.kind == Kind::rod      ? indexOf(config_.rods, place.name)
               : place.kind == Kind::thread ? indexOf(config_.threads, place.name)
                                            : indexOf(config_.cloths, place.name);
+    meets_all_ = place.kind != Kind::cloth || (object_ >= 0 && takesBarrier(object_));
   }
 
   std::string text()
@@ -134,21 +135,26 @@ private:
       return kind == place_.kind && index == object_ ? kind == Kind::rod && contact->self
                                                      : contact->others && other && other->others;
     };
-    for (int r = 0; place_.kind != Kind::cloth && r < static_cast<int>(config_.rods.size()); ++r)
+    for (int r = 0; meets_all_ && r < static_cast<int>(config_.rods.size()); ++r)
       if (meets(Kind::rod, r, config_.rods[r].contact))
         addRod(r, radius);
-    for (int k = 0; place_.kind != Kind::cloth && k < static_cast<int>(config_.threads.size()); ++k)
+    for (int k = 0; meets_all_ && k < static_cast<int>(config_.threads.size()); ++k)
       if (meets(Kind::thread, k, config_.threads[k].contact))
         addThread(k, radius);
-    for (int k = 0; place_.kind == Kind::cloth && k < static_cast<int>(config_.cloths.size()); ++k)
-      if (meets(Kind::cloth, k, config_.cloths[k].contact))
+    for (int k = 0; k < static_cast<int>(config_.cloths.size()); ++k)
+      if ((place_.kind == Kind::cloth || takesBarrier(k)) && meets(Kind::cloth, k, config_.cloths[k].contact))
         addCloth(k);
   }
 
-  /// Rods pass through the bodies that they are welded to, and cloth meets driven bodies only.
+  /// Rods pass through the bodies that they are welded to, and cloth with impulses meets driven bodies only.
   bool touches(const BodyConfig& body) const
   {
-    return place_.kind == Kind::rod ? !body.isWeldedTo(object_) : place_.kind == Kind::thread || body.motion;
+    return place_.kind == Kind::rod ? !body.isWeldedTo(object_) : meets_all_ || body.motion;
+  }
+  bool takesBarrier(int cloth) const
+  {
+    const auto& contact = config_.cloths[cloth].contact;
+    return contact && contact->method == ContactMethod::barrier;
   }
 
   void addSolids(double radius)
@@ -248,6 +254,7 @@ private:
   const SceneConfig& config_;
   const FailurePlace& place_;
   int object_ = -1;
+  bool meets_all_ = true;   ///< false for cloth with impulses
   Nearest holder_, partner_;
 };
 

@@ -62,6 +62,7 @@ std::vector<BodyWeld> weldsOf(const SceneConfig& config)
 StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before, const SceneConfig& to,
                              const std::vector<GraspRef>& now)
   : to_(to),
+    gap_ratio_(from.contact.gap / to.contact.gap),
     before_(before.begin(), before.end()),
     now_(now),
     welds_before_(weldsOf(from)),
@@ -211,8 +212,8 @@ void StateTransfer::take(const SceneState& before, const WorldModel& world, Scen
     throw SceneError(problem + "; this cannot change while the scene runs: start the edited scene anew");
 }
 
-/// Copies what contact keeps of the objects that stay. Ranges to solids that stay are the old ones, and those to new
-/// solids the ones that the edited world has found.
+/// Copies what contact keeps of the objects that stay. Shares of the gap become those of the new gap. Ranges to solids
+/// that stay are the old ones, and those to new solids the ones that the edited world has found.
 void StateTransfer::takeContacts(const std::vector<int>& same, const std::vector<ContactMemory>& from,
                                  std::vector<ContactMemory>& to) const
 {
@@ -237,6 +238,10 @@ void StateTransfer::takeContacts(const std::vector<int>& same, const std::vector
     };
     keep(to[k].springs);
     keep(to[k].ranges);
+    for (ContactRange& range : to[k].ranges)
+      range.share = std::min(1.0, gap_ratio_ * range.share);
+    for (BarrierLayer& layer : to[k].barrier.layers)
+      layer.share = std::min(1.0, gap_ratio_ * layer.share);
     for (const ContactRange& range : found)
       if (isNew(indexBefore(range.partner)))
         to[k].ranges.push_back(range);
