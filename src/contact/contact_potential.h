@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "barrier_stiffness.h"
@@ -136,6 +137,8 @@ public:
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns = nullptr);
   const std::vector<ContactTerm>& terms() const { return found_.terms; }
+  /// Energy of the springs of friction in the last evaluate() [J], which is part of what this returned.
+  double frictionEnergy() const { return std::accumulate(rubbed_.begin(), rubbed_.end(), 0.0); }
   const std::vector<ContactRow>& rows() const { return found_.rows; }
   /// Adds to the normal forces of terms() what they gain, to first order, in a motion of the points, and of the solids
   /// that move as prescribed. Forces that would become smaller do not change. The last evaluate() must have computed

@@ -208,7 +208,7 @@ double ContactPotential::addTerms(const Place& place, const Eigen::VectorXd* tur
     for (int k = first; k < last; ++k)
       rubbed_[k] = addFriction(place, turns, lagged_[k], out);
   });
-  return std::accumulate(rubbed_.begin(), rubbed_.end(), 0.0);
+  return frictionEnergy();
 }
 
 /// Does not take the new forces over if they have changed by less than `least`. `predicted`: instead of present normal

@@ -235,7 +235,7 @@ void Equations::beginStage(bool first)
     return;
   matrix_.beginStage();
   // Friction sticks below a speed over the whole step. In substeps that range would become too narrow to find.
-  contact_->begin(points_base_, poses_base_, duration_);
+  contact_->begin(points_base_, poses_base_, frictionTime());
   turns_begin_ = turns_base_;
   if (!first)
     return;

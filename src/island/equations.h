@@ -67,6 +67,9 @@ public:
 
   // ---- a step. Fractions are of this step.
   void beginStep(double duration) { duration_ = duration, linear_iterations_ = 0; }   ///< [s]
+  /// Friction sticks as in steps of at most this duration [s]; by default, of any.
+  void setFrictionTime(double time) { friction_time_ = time; }
+  double frictionTime() const { return std::min(duration_, friction_time_); }
   /// A substep begins at this fraction: numbers unknowns and surface points, and takes the configuration where it
   /// starts.
   void beginSubstep(double fraction);
@@ -188,7 +191,7 @@ private:
 
   std::vector<Part*> parts_;
   int threads_ = 1;
-  double duration_ = 1.0;
+  double duration_ = 1.0, friction_time_ = kInfinity;
 
   SharedMatrix matrix_;
   int multipliers_ = 0;   ///< number of the first multiplier of averages in the matrix, which come last

@@ -234,13 +234,7 @@ RodEvaluation Statics::load()
   equations_->beginSubstep(1.0);
   equations_->setExact(true);
   if (ContactPotential* contact = equations_->contact())
-  {
-    // Friction sticks below its slip speed over the whole step. In a step without end nothing sticks. The springs of a
-    // step before it would store an energy that has no meaning here.
-    constexpr double kForever = 1e15;
-    contact->setSprings({});
-    contact->begin(equations_->startPoints(), equations_->startSolids(), kForever);
-  }
+    contact->begin(equations_->startPoints(), equations_->startSolids(), equations_->frictionTime());
   for (Part* part : parts_)
     part->setPencil(0.0);
   const RodEvaluation at = equations_->evaluate(false);
@@ -252,7 +246,7 @@ EquilibriumStability Statics::assess(bool spectrum)
 {
   const RodEvaluation at = load();
   EquilibriumStability result;
-  result.energy = at.energy();
+  result.energy = at.energy() - (equations_->contact() ? equations_->contact()->frictionEnergy() : 0.0);
   result.energy_noise = 1e-13 * (std::abs(at.stretch) + std::abs(at.bend_twist) + std::abs(at.potential));
   for (const Part* part : parts_)
     result.work += part->staticWork();
@@ -271,8 +265,8 @@ EquilibriumStability Statics::assess(bool spectrum)
 
 // ---- eigenvalues
 
-/// Factors K + rate M, with the exact second derivative of contact and without friction. Returns whether the matrix is
-/// positive definite.
+/// Factors K + rate M, with the exact second derivative of contact and with friction that sticks. Returns whether the
+/// matrix is positive definite.
 bool Statics::definite(double rate)
 {
   for (Part* part : parts_)

@@ -70,6 +70,8 @@ WorldStatics::WorldStatics(WorldObjects& objects)
     object->addParts(parts);
   setParts(island_.island().equations(), std::move(parts), time_.newton);
   island_.island().keepBarriers();
+  // Friction holds as in the steps of the scene, however long the steps of the search are.
+  island_.island().equations().setFrictionTime(objects.world.time.step);
 }
 
 // ---- states of its parts
@@ -84,14 +86,6 @@ void WorldStatics::copy(const WorldState& from, WorldState& to) const
   to.obstacles = from.obstacles;
   to.obstacle_velocities = from.obstacle_velocities;
   to.contact = from.contact;
-}
-
-/// Springs are forgotten after each step of the search: friction may slow the search, and holds nothing.
-void WorldStatics::forgetSprings()
-{
-  for (auto* memories : {&work_.contact.rods, &work_.contact.bodies, &work_.contact.cloths, &work_.contact.threads})
-    for (ContactMemory& memory : *memories)
-      memory.springs.clear();
 }
 
 std::function<void()> WorldStatics::wayBack()
@@ -109,7 +103,10 @@ void WorldStatics::loadParts()
   begin(1.0);
   Statics::loadParts();
   if (island_.contact())
+  {
     island_.island().loadBarriers(0.0);
+    island_.island().equations().contact()->setSprings(island_.island().springs);
+  }
 }
 
 void WorldStatics::takeTrial()
@@ -147,30 +144,35 @@ StepReport WorldStatics::step(double h)
     return report;
   takeParts();
   island_.end(work_);
-  forgetSprings();
   moveGiven(objects_.world, *inputs_, h, work_);
   return report;
 }
 
 /// Returns the largest unbalanced force [N]: the one that accelerates rods and bodies in a step of h from rest.
-double WorldStatics::unbalanced(double h) const
+/// `farthest`: how far they move in it [m].
+double WorldStatics::unbalanced(double h, double& farthest) const
 {
   double sum = 0.0;
+  farthest = 0.0;
   for (const RodObject& rod : objects_.rods)
   {
     const RodModel& m = *rod.stepper->model;
     const Eigen::Matrix3Xd &from = before_.rods[rod.index].x, &to = work_.rods[rod.index].x;
     for (int i = 0; i < m.nodes(); ++i)
-      if (rod.stepper->system.isMoving(i))
-        sum = std::max(sum, m.mass[i] * (to.col(i) - from.col(i)).norm() / (h * h));
+      if (const double move = (to.col(i) - from.col(i)).norm(); rod.stepper->system.isMoving(i))
+      {
+        sum = std::max(sum, m.mass[i] * move / (h * h));
+        farthest = std::max(farthest, move);
+      }
   }
   for (const BodyObject& body : objects_.bodies)
   {
     const RigidBodyModel& m = objects_.world.bodies[body.index].body;
     const Pose &from = before_.bodies[body.index].X_WB, &to = work_.bodies[body.index].X_WB;
     const Eigen::Vector3d turn = rotationVector(from.orientation.conjugate() * to.orientation);
-    sum = std::max(
-        {sum, m.mass * (to.position - from.position).norm() / (h * h), (m.inertia * turn).norm() / (lever_ * h * h)});
+    const double move = (to.position - from.position).norm();
+    sum = std::max({sum, m.mass * move / (h * h), (m.inertia * turn).norm() / (lever_ * h * h)});
+    farthest = std::max(farthest, move);
   }
   return sum;
 }
@@ -178,8 +180,9 @@ double WorldStatics::unbalanced(double h) const
 /// Steps from rest, the first of `h` seconds, until nothing is accelerated. Returns false when that does not end.
 bool WorldStatics::settle(double h)
 {
-  constexpr int kMaxRounds = 400;
+  constexpr int kMaxRounds = 400, kMostSliding = 200;
   constexpr double kUnbalanced = 1e-8;   // of the largest force
+  constexpr double kDrift = 1e6;         // gaps: what moves farther from rest is held by nothing
   for (int round = 0, failures = 0; round < kMaxRounds; ++round)
   {
     standStill(work_);
@@ -198,7 +201,8 @@ bool WorldStatics::settle(double h)
     }
     ++report_.substeps;
     force_scale_ = std::max(force_scale_, equations().forceScale());
-    const double force = unbalanced(h);
+    double farthest = 0.0;
+    const double force = unbalanced(h, farthest);
     report_.residual = force == 0.0 ? 0.0 : force / force_scale_;
     report_.max_strain = report.max_strain;
     if (round > 0 && report_.residual < kUnbalanced)
@@ -206,7 +210,13 @@ bool WorldStatics::settle(double h)
       standStill(work_);
       return true;
     }
-    h = std::min(h * (report.iterations < 10 ? 4.0 : 1.5), 1e6);
+    if (island_.contact() && farthest > kDrift * island_.contact()->options().gap)
+      break;
+    // In a long step things slide far before they press on each other enough for friction to hold them.
+    const bool slides =
+        round < kMostSliding && !island_.island().springs.empty() && farthest > island_.contact()->options().gap;
+    if (!slides)
+      h = std::min(h * (report.iterations < 10 ? 4.0 : 1.5), 1e6);
   }
   failure_ = StepFailure::newton_diverged;
   report_.message =
@@ -231,7 +241,6 @@ StepReport WorldStatics::solve(WorldState& state, const WorldInputs& inputs)
     return report_;
   inputs_ = &inputs;
   copy(state, work_);
-  forgetSprings();
   if (settle(time_.step))
   {
     settleStably(true);

@@ -37,9 +37,8 @@ private:
   void takeParts();
   StepReport step(double h);
   bool settle(double h);
-  double unbalanced(double h) const;
+  double unbalanced(double h, double& farthest) const;
   void copy(const WorldState& from, WorldState& to) const;
-  void forgetSprings();
 
   WorldObjects& origin_;
   const TimeConfig time_;

@@ -277,6 +277,30 @@ TEST(BodyContact, SqueezedBodiesFeelNoForceAcross)
   }
 }
 
+/// Friction holds in statics below the cone, with the force of equilibrium, and nowhere above it.
+TEST(BodyContact, EquilibriaOnASlopeHoldBelowTheCone)
+{
+  const auto scene = [](double slope) {
+    std::ostringstream text;
+    text << "start: equilibrium\ntime: {step: 0.005}\ngravity: [" << slope
+         << ", 0, -10]\nbodies:\n  - {name: box, mass: 1, "
+         << "friction: 0.3, shape: {box: {size: [0.2, 0.2, 0.1]}}, pose: {position: [0, 0, 0.0502]}}\n"
+         << "obstacles: [{name: floor, shape: {plane: {}}, friction: 0.3}]\n";
+    return parseScene(text.str());
+  };
+  for (const double slope : {0.5, 2.9})
+  {
+    Simulation s(scene(slope));
+    const Vector3d at = s.state().bodies[0].X_WB.position, force = s.world().contactLoads().obstacles[0].force;
+    EXPECT_LT((at - Vector3d(0, 0, 0.0502)).norm(), 2e-4) << slope;   // it starts 0.2 mm above the floor
+    // Near the cone, corners slip by what normal forces have changed since friction took them: at most 1 %.
+    EXPECT_LT((force - Vector3d(slope, 0, -10)).norm(), slope < 1.0 ? 1e-6 : 0.01 * slope) << slope;
+    runFor(s, 0.1);
+    EXPECT_LT((s.state().bodies[0].X_WB.position - at).norm(), 1e-6) << slope;
+  }
+  EXPECT_THROW(Simulation(scene(3.1)), SimulationError);
+}
+
 /// The plane of a small face cuts a wide plate that is hardly tilted. Steps were refused because of it.
 TEST(BodyContact, ABoxStandsAnywhereOnAWidePlate)
 {

@@ -216,6 +216,14 @@ TEST(IgnoredInputs, frictionThatNothingFeelsIsWarnedOf)
             1);
   EXPECT_EQ(
       count(warningsOf("contact: {slip_speed: 0.001}\n" + rod + "    contact: {friction: 0.1}\n"), {"slip_speed"}), 0);
+  const auto sheet = [](const std::string& friction) {
+    return "contact: {slip_speed: 0.001}\ncloths:\n  - {name: sheet, grid: {corner: [0, 0, 0], sides: [[1, 0, 0], [0, "
+           "1, "
+           "0]], cells: 4}, contact: {method: barrier, friction: " +
+           friction + "}}\n";
+  };
+  EXPECT_EQ(count(warningsOf(sheet("0.1")), {"slip_speed"}), 0);
+  EXPECT_EQ(count(warningsOf(sheet("0")), {"slip_speed"}), 1);
 }
 
 TEST(IgnoredInputs, plasticityThatNeverFlowsIsWarnedOf)

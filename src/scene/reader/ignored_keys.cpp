@@ -168,13 +168,17 @@ void warnOfFriction(const YamlCursor& friction, const std::string& why)
     friction.warning("has no effect: " + why);
 }
 
-/// The section `contact` of the scene. Rods and threads have a slip speed, cloths do not.
+/// The section `contact` of the scene. Cloth that collides by impulses has no slip speed.
 void warnOfSlipSpeed(const YamlCursor& slip_speed, const SceneConfig& scene)
 {
   const auto rubs = [](const auto& object) { return object.contact && object.contact->friction > 0; };
-  warnIf(!any(scene.rods, rubs) && !any(scene.threads, rubs) && !any(scene.bodies, slips), slip_speed,
-         "has no effect: friction is 0 for all rods, threads and bodies that touch anything; give them a friction, or "
-         "leave it out");
+  const auto barrier_rubs = [&](const ClothConfig& cloth) {
+    return rubs(cloth) && cloth.contact->method == ContactMethod::barrier;
+  };
+  warnIf(!any(scene.rods, rubs) && !any(scene.threads, rubs) && !any(scene.bodies, slips) &&
+             !any(scene.cloths, barrier_rubs),
+         slip_speed,
+         "has no effect: nothing that touches by the barrier has friction; give it a friction, or leave it out");
 }
 
 void warnOfMaterial(const YamlCursor& material, const Eigen::Vector3d& gravity)

@@ -152,6 +152,9 @@ StaticsRow StaticsRunner::rowAt(double factor, const StepReport& report)
     row.modes.push_back(stepper ? Eigen::Matrix4Xd(stepper->lowestMode()) : Eigen::Matrix4Xd(4, 0));
     row.displacement = std::max(row.displacement, largestDistance(state_.rods[r].x, start_.rods[r].x));
   }
+  for (std::size_t b = 0; b < state_.bodies.size(); ++b)
+    row.displacement =
+        std::max(row.displacement, (state_.bodies[b].X_WB.position - start_.bodies[b].X_WB.position).norm());
   for (std::size_t k = 0; k < state_.cloths.size(); ++k)
     row.displacement = std::max(row.displacement, largestDistance(state_.cloths[k].x, start_.cloths[k].x));
   return row;
