@@ -62,7 +62,7 @@ std::vector<BodyWeld> weldsOf(const SceneConfig& config)
 StateTransfer::StateTransfer(const SceneConfig& from, const SceneGrasps& before, const SceneConfig& to,
                              const std::vector<GraspRef>& now)
   : to_(to),
-    gap_ratio_(from.contact.gap / to.contact.gap),
+    gap_ratio_(from.contact.gap > 0 && to.contact.gap > 0 ? from.contact.gap / to.contact.gap : 1.0),
     before_(before.begin(), before.end()),
     now_(now),
     welds_before_(weldsOf(from)),
