@@ -12,7 +12,7 @@ namespace slender {
 namespace {
 
 constexpr double kNear = 0.1;             ///< increment, over the shortest edge, below which the exact Hessian is taken
-constexpr double kSemidefinite = 5e-3;    ///< shift of positions from which on the Hessian is semidefinite
+constexpr double kSemidefinite = 5e-3;    ///< least shift of positions with a semidefinite Hessian
 constexpr double kShiftOfAngle = 0.2;     ///< of the weight of inertia, per unit of a shift of angles
 constexpr double kFirstShift = 1e-3;      ///< of all vertices in statics, per unit of a shift of angles
 constexpr int kTimesWork = 5;             ///< of a step in an island, over that of a cloth alone

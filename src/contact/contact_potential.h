@@ -137,7 +137,8 @@ public:
   double evaluate(const Eigen::Matrix3Xd& x, const std::vector<Pose>& solids, bool with_stiffness,
                   const Eigen::VectorXd* turns = nullptr);
   const std::vector<ContactTerm>& terms() const { return found_.terms; }
-  /// Energy of the springs of friction in the last evaluate() [J], which is part of what this returned.
+  /// Energy of the springs of friction in the last evaluate() [J], which is a part of the potential that evaluate()
+  /// returned.
   double frictionEnergy() const { return std::accumulate(rubbed_.begin(), rubbed_.end(), 0.0); }
   const std::vector<ContactRow>& rows() const { return found_.rows; }
   /// Adds to the normal forces of terms() what they gain, to first order, in a motion of the points, and of the solids

@@ -280,8 +280,8 @@ double BodyPart::energyOf(const RigidBodyState& s) const
          (m.gravity ? m.mass * gravity.dot(s.X_WB.position) : 0.0);
 }
 
-/// The energy of the position depends on the origin of coordinates, so that the growth that is allowed does not contain
-/// it.
+/// The allowed growth is a share of the kinetic energy, and of the work of the forces along the radius of gyration. It
+/// does not depend on where the origin of coordinates is.
 double BodyPart::energyAtStart(double& allowance)
 {
   const RigidBodyModel& m = system.model();

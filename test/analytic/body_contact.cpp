@@ -293,7 +293,7 @@ TEST(BodyContact, EquilibriaOnASlopeHoldBelowTheCone)
     Simulation s(scene(slope));
     const Vector3d at = s.state().bodies[0].X_WB.position, force = s.world().contactLoads().obstacles[0].force;
     EXPECT_LT((at - Vector3d(0, 0, 0.0502)).norm(), 2e-4) << slope;   // it starts 0.2 mm above the floor
-    // Near the cone, corners slip by what normal forces have changed since friction took them: at most 1 %.
+    // Friction keeps normal forces that have changed by less than 1 % since. Near the cone, some corners then slip.
     EXPECT_LT((force - Vector3d(slope, 0, -10)).norm(), slope < 1.0 ? 1e-6 : 0.01 * slope) << slope;
     runFor(s, 0.1);
     EXPECT_LT((s.state().bodies[0].X_WB.position - at).norm(), 1e-6) << slope;

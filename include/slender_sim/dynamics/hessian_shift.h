@@ -14,7 +14,7 @@ struct HessianShift
   double last = 0.0;   ///< the last shift of positions with which the Hessian was definite; 0: none yet
 
   bool none() const { return position == 0.0 && angle == 0.0; }
-  /// Begins with the shift that was enough before. While a body buckles, many iterations in a row need one.
+  /// Begins with the shift that was enough before, because a body that buckles needs one in many iterations in a row.
   void raise()
   {
     constexpr double kFirst = 0.1, kMostAngle = 10.0;

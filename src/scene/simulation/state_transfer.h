@@ -55,7 +55,7 @@ private:
   void takeGrasps(const SceneState& before, SceneState& state) const;
 
   const SceneConfig& to_;
-  const double gap_ratio_;   ///< of contact, before the edit over after it; 1: one has no contact
+  const double gap_ratio_;   ///< the gap of contact before the edit over the one after it; 1 if a scene has no contact
   const std::vector<GraspRef> before_, now_;
   const std::vector<BodyWeld> welds_before_, welds_now_;
   // per object, grasp or weld of the edited scene: its index in the scene before the edit; -1: it is new
